@@ -18,6 +18,7 @@ from autopilot.wire.items import (
     Handling,
     MissionItemError,
     WireItem,
+    endless_loops,
     handling_of,
     located_steps,
 )
@@ -27,7 +28,7 @@ from gcs.formats.jumps import redirected
 from gcs.formats.plan import Plan, read_plan, write_plan
 from gcs.formats.waypoints import HEADER, is_home_row, read_waypoints, write_waypoints
 from gcs.mission_items import flown_steps, loop_ends
-from missions.model import Land
+from missions.model import Land, Release
 from missions.text_files import TextFileError, text_of
 
 PLAN_ENDING = ".plan"
@@ -140,6 +141,10 @@ def mission_of(plan: Plan, home: Home, name: str) -> ForeignMission:
         for number, item in zip(numbers, items, strict=True)
         if ends and item.command == mavlink.MAV_CMD_DO_JUMP and item.param2 == ENDLESS
     ]
+    release = next((i for i, one in enumerate(flown) if isinstance(one.step, Release)), None)
+    if release is not None and any(first <= release <= last for last, first in endless_loops(flown).items()):
+        number = numbers[flown[release].last]
+        kept.append(f"item {number}: releases the load in the first pass; the next ones are flown without it")
     landing = flown[-1].last if flown and isinstance(flown[-1].step, Land) else len(remaining)
     if after := numbers[landing + 1 :]:
         places = f"item {after[0]}" if len(after) == 1 else f"items {after[0]} to {after[-1]}"

@@ -16,7 +16,7 @@ from autopilot.wire.items import WireItem, encode_steps
 from gcs.cli import gcs
 from gcs.clients.flight import FlightClient
 from gcs.closed_loop import Conditions, fly
-from gcs.errors import EXIT_USAGE, InputError
+from gcs.errors import EXIT_DONE, EXIT_USAGE, InputError
 from gcs.foreign_mission import ForeignMission
 from gcs.formats.missions import write_foreign
 from gcs.mission_files import is_mission_file, load, read
@@ -279,3 +279,31 @@ def test_a_loop_is_left_by_a_ground_station_and_the_mission_ends(tmp_path: Path)
     checked = CliRunner().invoke(gcs, ["check", str(path)], prog_name="gcs").stdout
     assert "item 3, DO_JUMP (177): repeats without end until a ground station makes an item behind" in checked
     assert "items[4] (waypoint): " in checked
+
+
+@pytest.mark.parametrize("released_in_loop", [True, False])
+def test_it_is_told_that_a_loop_which_releases_the_load_goes_on_without_it(
+    tmp_path: Path, released_in_loop: bool
+) -> None:
+    steps = (Takeoff(2.0), Waypoint(1.0, 0.0, 2.0), Waypoint(1.0, 1.0, 2.0))
+    release = command(mavlink.MAV_CMD_DO_GRIPPER, 1.0, 0.0)
+    takeoff, *corners = encode_steps(steps, HOME)
+    back_to = 1.0 if released_in_loop else 2.0
+    path = tmp_path / "loop.plan"
+    write_foreign(path, (takeoff, release, *corners, command(mavlink.MAV_CMD_DO_JUMP, back_to, -1.0)), HOME)
+    checked = CliRunner().invoke(gcs, ["check", str(path)], prog_name="gcs").stdout
+    told = "item 1: releases the load in the first pass; the next ones are flown without it"
+    assert (told in checked) == released_in_loop, checked
+
+
+def test_the_way_back_of_a_loop_over_a_fence_is_refused_by_gcs_check(tmp_path: Path) -> None:
+    corners = (Takeoff(2.0), Waypoint(1.0, 0.0, 2.0), Waypoint(1.0, 1.0, 2.0), Waypoint(-1.0, 1.0, 2.0))
+    zone = place(mavlink.MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION, 0.2, 0.0, 0.5)
+    path = tmp_path / "loop.plan"
+    items = (*encode_steps(corners, HOME), command(mavlink.MAV_CMD_DO_JUMP, 1.0, -1.0))
+    write_foreign(path, items, HOME, fence=(zone,))
+    result = CliRunner().invoke(gcs, ["check", str(path)], prog_name="gcs")
+    assert result.exit_code != EXIT_DONE
+    assert "item 1 leads into an exclusion zone of the fence, when a jump without end repeats it" in (
+        result.stdout + result.stderr
+    )

@@ -31,7 +31,19 @@ from autopilot.wire.items import (
     located_steps,
     read_items,
 )
-from missions.model import Delay, Land, ReturnHome, Signals, Step, Takeoff, Term, Waypoint
+from missions.model import (
+    Delay,
+    Land,
+    Release,
+    ReturnHome,
+    Signals,
+    Step,
+    Takeoff,
+    Term,
+    TurnHeading,
+    Waypoint,
+    Winch,
+)
 from tests.doubles.sky import ACCEPTED, SETTINGS, Sky
 
 HOME = Home(47.397742, 8.545594, 488.0)
@@ -122,7 +134,8 @@ BEHIND = (Waypoint(-2.0, -1.0, 1.5), Waypoint(-2.0, 1.0, 1.5), Waypoint(0.0, 0.0
 def looping(loop: Sequence[Step] = LOOP, behind: Sequence[Step] = BEHIND, back_to: int = 1) -> list[WireItem]:
     """The items of a loop without end, of the jump, and of what stands behind it."""
     jump = item(JUMP, float(back_to), -1.0)
-    return [*encode_steps(loop, Home()), jump, *encode_steps((*loop, *behind), Home())[len(loop) :]]
+    repeated = encode_steps(loop, Home())
+    return [*repeated, jump, *encode_steps((*loop, *behind), Home())[len(repeated) :]]
 
 
 def plan_of(items: Sequence[WireItem]) -> MissionPlan:
@@ -283,3 +296,94 @@ def test_a_loop_is_not_left_over_the_fence() -> None:
     assert (verdict.result, verdict.text) == (mavlink.MAV_RESULT_DENIED, text)
     sky.run(lambda s: s.flight.mission.step == 1)
     assert sky.ask(SetCurrent(5)).result == ACCEPTED
+
+
+def fenced(items: Sequence[WireItem], radius_m: float = 0.0, fence: Fence | None = None) -> Sky:
+    """A vehicle on the ground with these items, a fence of this radius, and this fence."""
+    sky = Sky(settings=replace(SETTINGS, fence=replace(SETTINGS.fence, radius_m=radius_m)))
+    sky.flight = with_plan(sky.flight, plan_of(items))
+    if fence is not None:
+        sky.flight = replace(sky.flight, area=replace(sky.flight.area, fence=fence))
+    return sky
+
+
+REPEATED = ", when a jump without end repeats it"
+
+
+def test_the_fence_is_checked_on_the_way_back_of_a_loop_at_the_upload_and_at_the_start() -> None:
+    """From its last corner straight to the first: through a zone that no other way meets."""
+    items = looping((Takeoff(2.0), *LOOP[1:3], Waypoint(-2.0, 2.0, 2.0)), behind=())
+    located = located_steps(items, Home())
+    for fence, text in (
+        (
+            Fence((Disc(False, (0.0, 1.0), 0.4),)),
+            f"item 1 leads into an exclusion zone of the fence{REPEATED}",
+        ),
+        (Fence((Disc(False, (-2.0, 0.0), 0.4),)), None),
+    ):
+        sky = fenced(items, fence=fence)
+        for asked in (ReplaceMission(len(items), located), StartMission(None)):
+            verdict = sky.ask(asked)
+            assert verdict.text == (text and f"Mission denied: {text}")
+
+
+@pytest.mark.parametrize("y_m", [0.25, 0.0])
+def test_signals_that_lead_farther_with_each_pass_leave_the_fence(y_m: float) -> None:
+    """With 0.25 m north in each pass, 10 m are passed in the forty-first; those that come back stay."""
+    out = Signals(3.0, (Term("x", 0.25, 0.0, 0.8, 0.5 if y_m == 0.0 else None, 0.8),))
+    items = looping((Takeoff(2.0), Delay(1.0), out), behind=())
+    verdict = fenced(items, radius_m=10.0).ask(StartMission(None))
+    if y_m == 0.0:
+        assert verdict.result == ACCEPTED
+    else:
+        assert str(verdict.text).startswith(f"Mission denied: item {len(items) - 2} leads beyond the fence")
+        assert str(verdict.text).endswith(REPEATED)
+
+
+@pytest.mark.parametrize(("shorter_m", "refused"), [(0.3, False), (0.2, True)])
+def test_a_winch_that_reels_out_more_than_in_is_refused(shorter_m: float, refused: bool) -> None:
+    """A cable of 0.7 m that becomes 0.1 m longer in each pass would be 3.1 m long in the twenty-second."""
+    loop = (Takeoff(4.0), Waypoint(1.0, 0.0, 4.0), Winch(0.3), Waypoint(0.0, 0.0, 4.0), Winch(-shorter_m))
+    verdict = fenced(looping(loop, behind=())).ask(StartMission(None))
+    if not refused:
+        assert verdict.result == ACCEPTED
+        return
+    assert verdict.result == mavlink.MAV_RESULT_DENIED
+    assert verdict.text == (
+        "Mission denied: item 2: a cable of 3.10 m; must be 0.3 ... 3 m (WNC_LEN_MIN, WNC_LEN_MAX)" + REPEATED
+    )
+
+
+@pytest.mark.parametrize(
+    "needing", [(Signals(3.0, (Term("y", 0.25, 0.0, 0.8, 0.5, 0.8),)),), (Winch(0.2), Winch(-0.2))]
+)
+def test_a_loop_that_releases_the_load_repeats_nothing_that_needs_it(needing: tuple[Step, ...]) -> None:
+    loop = (Takeoff(2.0), Waypoint(2.0, 0.0, 2.0), *needing, Waypoint(1.0, 0.0, 2.0), Release())
+    items = looping(loop, behind=())
+    with pytest.raises(
+        MissionItemError, match="needs the load, which is released before the jump"
+    ) as refused:
+        located_steps(items, Home())
+    assert refused.value.seq == 2
+    once = items[:-1]
+    assert len(located_steps(once, Home())) == len(loop)
+
+
+def test_a_loop_that_releases_the_load_goes_on_without_it() -> None:
+    loop = (Takeoff(2.0), Waypoint(2.0, 0.0, 2.0), Release(), Waypoint(0.0, 0.0, 2.0))
+    sky = started(looping(loop, behind=()))
+    sky.run(lambda s: len(s.reached) == 10)
+    assert sky.reached == [0, 1, 2, 3, 1, 2, 3, 1, 2, 3]
+    assert sky.flight.cable.released
+
+
+def test_the_nose_turns_between_a_return_and_the_jump_behind_it() -> None:
+    yaw = item(mavlink.MAV_CMD_CONDITION_YAW, 90.0)
+    home, jump = item(mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH, 0.0), item(JUMP, 1.0, -1.0)
+    loop = encode_steps((Takeoff(2.0), Waypoint(2.0, 0.0, 2.0)), Home())
+    sky = started([*loop, home, yaw, jump])
+    sky.run(lambda s: len(s.reached) >= 9)
+    assert sky.reached[:9] == [0, 1, 2, 3, 1, 2, 3, 1, 2]
+    (aims,) = filter(None, sky.flight.mission.plan.aims)
+    assert aims == ((3, TurnHeading(0.0)),)
+    assert [type(one.step) for one in located_steps([*loop, home, yaw], Home())][-1] is ReturnHome, "it lands"

@@ -32,12 +32,14 @@ from autopilot.supervisor.state import (
     ActionWhenArmed,
     Event,
     Flight,
+    MissionPlan,
     Phase,
     View,
     interrupt_mission,
 )
 from autopilot.supervisor.table import TRANSITIONS
 from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.items import endless_loops
 from missions import model
 
 # steps for which a vehicle on the ground takes off
@@ -155,7 +157,8 @@ def replace_mission(flight: Flight, request: ReplaceMission, view: View, setting
         return flight, denied("Mission denied: the present one is being flown; pause it first")
     steps = tuple(located.step for located in request.steps)
     sequence = tuple(located.first for located in request.steps)
-    problem = upload_problem(flight, steps, sequence, view, settings)
+    plan = MissionPlan(steps, sequence, request.count, loops=endless_loops(request.steps))
+    problem = upload_problem(flight, plan, view, settings)
     if problem:
         return flight, denied(f"Mission denied: {problem}")
     return flight, ACCEPTED

@@ -6,7 +6,7 @@ Each check walks the timeline of the steps (`autopilot.trajectory.timeline`) fro
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -42,12 +42,14 @@ from autopilot.trajectory.timeline import (
 )
 from autopilot.trajectory.waypoint_path import PathSegment, sample_path
 from autopilot.wire.statustext import listed
-from missions.model import AttitudeRun, LoadPath, ReturnHome, Step, Takeoff, Waypoint, Winch
+from missions.model import AttitudeRun, LoadPath, ReturnHome, Takeoff, Waypoint, Winch
 
 # spacing of the places at which a line is checked, and their greatest number
 CHECK_SPACING_M, MAX_CHECK_POINTS = 0.25, 4000
 CHECK_SPACING_S = 0.1  # the same for a path in time
 MIN_CURVE_POINTS = 16  # between two waypoints, however close
+# where passes of a loop differ: how many steps are checked, and the distance that is no difference
+MAX_REPEATED_STEPS, SAME_PLACE_M = 200, 1e-3
 MAX_CHECKED_RALLY = 50  # rally points that are compared with the fence
 
 RemainingSteps = list[tuple[int, TimelineEntry]]  # each with its mission item
@@ -55,18 +57,22 @@ RemainingSteps = list[tuple[int, TimelineEntry]]  # each with its mission item
 
 def mission_problem(flight: Flight, ahead: RemainingSteps, settings: Settings) -> str:
     """Which remaining item must not be flown from here, and why; an empty string if there is none."""
+    again = repeated_steps(flight.mission.plan, ahead, flight.area.home)
     return (
         fence_exit_problem(flight, ahead, settings)
         or curve_exit_problem(flight, ahead, settings)
         or height_problem(ahead)
         or missing_load_problem(ahead)
         or winch_problem(ahead, settings)
+        or _when_repeated(
+            fence_exit_problem(flight, again, settings)
+            or missing_load_problem(again)
+            or winch_problem(again, settings)
+        )
     )
 
 
-def upload_problem(
-    flight: Flight, steps: Sequence[Step], sequence: Sequence[int], view: View, settings: Settings
-) -> str:
+def upload_problem(flight: Flight, plan: MissionPlan, view: View, settings: Settings) -> str:
     """Which item of an uploaded mission leads beyond the fence or too low, and why; an empty string if none
     does.
 
@@ -75,8 +81,17 @@ def upload_problem(
     start = replace(ANYWHERE, cable_m=settings.cable_length_m, released=flight.cable.released)
     if flight.phase in ON_GROUND:
         start = _on_ground(flight, view, settings)
-    ahead = list(zip(sequence, timeline(steps, start, flight.area.home), strict=True))
-    return fence_exit_problem(flight, ahead, settings) or height_problem(ahead)
+    home = flight.area.home
+    ahead = list(zip(plan.sequence, timeline(plan.steps, start, home), strict=True))
+    return (
+        fence_exit_problem(flight, ahead, settings)
+        or height_problem(ahead)
+        or _when_repeated(fence_exit_problem(flight, repeated_steps(plan, ahead, home), settings))
+    )
+
+
+def _when_repeated(problem: str) -> str:
+    return problem and f"{problem}, when a jump without end repeats it"
 
 
 def remaining_timeline(flight: Flight, view: View, settings: Settings) -> RemainingSteps:
@@ -100,6 +115,37 @@ def remaining_timeline(flight: Flight, view: View, settings: Settings) -> Remain
             steps = (replace(steps[0], length_m=cable.reel_target_m - length), *steps[1:])
         start = MissionState(here, cable_m=length, released=cable.released)
     return list(zip(sequence, timeline(steps, start, flight.area.home), strict=True))
+
+
+def repeated_steps(plan: MissionPlan, ahead: RemainingSteps, home: Vec3) -> RemainingSteps:
+    """What loops without end fly after these last steps of a plan, until a step begins in the state in which
+    it began before, from which on all is the same again.
+
+    Where each pass changes the state, as signals that lead away and a winch do, there are many passes.
+    """
+    count, again = len(plan.steps), RemainingSteps()
+    began = {count - len(ahead) + i: entry.before for i, (_, entry) in enumerate(ahead)}  # by step
+    for end in plan.loops:
+        if count - end > len(ahead):
+            continue  # a loop that was left
+        state, step = ahead[end - count][1].after, plan.next_step(end)
+        while step is not None and len(again) < count + MAX_REPEATED_STEPS:
+            if step in began and _is_same_state(state, began[step]):
+                break
+            began[step] = state
+            (entry,) = timeline((plan.steps[step],), state, home)
+            again.append((plan.sequence[step], entry))
+            state, step = entry.after, plan.next_step(step)
+    return again
+
+
+def _is_same_state(a: MissionState, b: MissionState) -> bool:
+    """Whether a step leads the same way from either state."""
+    if (a.released, a.unknown_after) != (b.released, b.unknown_after):
+        return False
+    if a.expected is None or b.expected is None or a.cable_m is None or b.cable_m is None:
+        return (a.expected, a.cable_m) == (b.expected, b.cable_m)
+    return norm(sub(a.expected, b.expected)) < SAME_PLACE_M and abs(a.cable_m - b.cable_m) < MIN_REEL_M
 
 
 def is_taking_off(flight: Flight) -> bool:

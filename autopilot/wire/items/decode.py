@@ -24,9 +24,11 @@ from autopilot.wire.items.records import END, LocatedStep, MissionItemError, Vis
 from autopilot.wire.items.table import COMMAND, handling_of
 from missions.model import (
     ORIGIN,
+    AttitudeRun,
     Delay,
     HeadingCommand,
     Land,
+    LoadPath,
     ReturnHome,
     Signals,
     Step,
@@ -34,6 +36,7 @@ from missions.model import (
     Term,
     Trajectory,
     TrajectoryPoint,
+    Winch,
 )
 
 _TERM, _FACTOR, _RUN, _POINT = (
@@ -204,8 +207,9 @@ class _Reader:
         """End the steps that follow one another with item `seq`, behind which the mission continues with step
         `then`; None: it ends."""
         self.end_step(seq)
+        lands = Land if then not in (None, END) else Land | ReturnHome
         # a hold in which the nose turns if no step follows, unless the mission lands anyway
-        if self._heading_commands and self.steps and not isinstance(self.steps[-1].step, Land | ReturnHome):
+        if self._heading_commands and self.steps and not isinstance(self.steps[-1].step, lands):
             self._add(LocatedStep(seq, seq, Delay(0.0)))
         self._heading_commands = {}
         if then is not None and len(self.steps) > self._stretch_begin:
@@ -214,22 +218,33 @@ class _Reader:
         self._stretch_begin = len(self.steps)
 
     def check_loop(self, jump: int, then: int) -> None:
-        """MissionItemError for a `jump` without end if what is flown from step `then` on takes no time until
-        it comes back."""
+        """MissionItemError if what a `jump` without end flies from step `then` on takes no time until it
+        comes back, or needs the load, which was released."""
         if then >= len(self.steps):
             raise _loop_error(jump)
-        lap = [then]
-        while lap[-1] != len(self.steps) - 1:
-            following = self.steps[lap[-1]].then
-            lap.append(lap[-1] + 1 if following is None else following)
-            if len(lap) > len(self.steps) or lap[-1] == END:
-                return  # it does not come back, but to another loop
-        entries = timeline((self.steps[i].step for i in lap), self._state, self._return_to)
+        lap, following = [then], self._following(then)
+        while lap[-1] != len(self.steps) - 1 and following != END and len(lap) < len(self.steps):
+            lap.append(following)
+            following = self._following(following)
+        entries = tuple(timeline((self.steps[i].step for i in lap), self._state, self._return_to))
+        for i, entry in zip(lap, entries, strict=True):
+            if entry.before.released and isinstance(entry.step, LoadPath | AttitudeRun | Winch):
+                text = (
+                    f"needs the load, which is released before the jump without end (item {jump}) repeats it"
+                )
+                raise MissionItemError(self.steps[i].first, text, mavlink.MAV_MISSION_INVALID)
+        if lap[-1] != len(self.steps) - 1:
+            return  # it does not come back, but to another loop
         # in the air a take-off only moves the load
         lap_s = sum(one.transfer_s if isinstance(one.step, Takeoff) else one.duration_s for one in entries)
         if lap_s < _MIN_LAP_S:
             text = f"what a jump without end repeats must take at least {_MIN_LAP_S:g} s"
             raise MissionItemError(jump, text, mavlink.MAV_MISSION_INVALID)
+
+    def _following(self, step: int) -> int:
+        """The step that is flown after one of the steps so far, or END."""
+        then = self.steps[step].then
+        return step + 1 if then is None else then
 
     def _add(self, located: LocatedStep) -> None:
         if self._heading_commands and not isinstance(located.step, Takeoff):  # on the ground no nose turns

@@ -186,9 +186,11 @@ COMMANDS: tuple[Command, ...] = (
         m.MAV_CMD_DO_JUMP,
         f"the mission continues with item p1, p2 times (0 ... {MAX_JUMPS}) or without end (-1). The items "
         "behind a jump without end are flown once one of them becomes the present item "
-        "(MISSION_SET_CURRENT), and the repeated ones must take at least 0.5 s. Another jump around it does "
-        f"not reset the count of a jump. A mission of more than {MAX_FLOWN_ITEMS} items, counted with all "
-        "repetitions, is refused. If a jump becomes the present item, it is executed",
+        "(MISSION_SET_CURRENT), and the repeated ones must take at least 0.5 s and, if they release the "
+        "load, do without it. All passes are checked before the flight, as far as they differ. Another jump "
+        "around it does not reset the count of a jump. A mission of more than "
+        f"{MAX_FLOWN_ITEMS} items, counted with all repetitions, is refused. If a jump becomes the present "
+        "item, it is executed",
     ),
     Command(
         m.MAV_CMD_DO_GRIPPER,
