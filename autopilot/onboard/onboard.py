@@ -208,7 +208,7 @@ def mission_plan(
     if limits is not None:
         planned = plan_function_for(planner)
         prepared = prepare(flown, sequence, limits, return_to, planned, loop_ends=loops)
-    aims = tuple(tuple(zip(s.heading_items, s.heading_commands, strict=True)) for s in steps)
+    aims = tuple(s.aims for s in steps)
     return MissionPlan(flown, sequence, len(mission.items), prepared, aims, loops, visits)
 
 

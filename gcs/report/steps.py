@@ -48,7 +48,7 @@ def step_texts(items: Sequence[WireItem], home: Home) -> list[StepText]:
         return [StepText(seq, seq, command_name(item.command)) for seq, item in enumerate(items)]
     texts, released = [], False
     for one in found:
-        words = "".join(f"; {_heading(command)}" for command in one.heading_commands)
+        words = "".join(f"; {_heading(command)}" for _, command in one.aims)
         texts.append(StepText(one.first, one.last, describe(one.step, released) + words))
         released = released or isinstance(one.step, Release)
     return texts

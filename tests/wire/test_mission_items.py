@@ -475,7 +475,7 @@ def test_points_in_a_row_are_one_trajectory_and_a_point_at_time_zero_begins_anot
         *((7, 7), (8, 9)),  # once more
     ]
     assert [one.step for one in located if isinstance(one.step, Trajectory)] == [through] * 4
-    assert [bool(one.heading_commands) for one in located] == [False] * 3 + [True] + [False] * 3
+    assert [bool(one.aims) for one in located] == [False] * 3 + [True] + [False] * 3
 
 
 def test_what_is_not_flown_is_known() -> None:
@@ -519,17 +519,16 @@ def test_items_that_turn_the_nose_belong_to_the_step_behind_them() -> None:
     ]
     steps = located_steps(items, HOME)
     assert [one.last for one in steps] == [1, 2, 4, 7, 9, 10]
-    assert steps[0].heading_commands == (), "on the ground no nose turns"
-    assert steps[1].heading_commands == (TurnHeading(0.0),), "from north, clockwise: to the east"
-    (seen,) = steps[2].heading_commands
+    assert steps[0].aims == (), "on the ground no nose turns"
+    assert steps[1].aims == ((0, TurnHeading(0.0)),), "from north, clockwise: to the east"
+    ((by, seen),) = steps[2].aims
+    assert by == 3
     assert isinstance(seen, LookAt) and seen.east_m is not None and seen.north_m is not None
     assert (seen.east_m, seen.north_m) == pytest.approx((12.0, -7.0), abs=PLACE_M)
     turned = TurnHeading(math.radians(30.0), relative=True, rate_rad_s=math.radians(20.0))
-    assert steps[3].heading_commands == (LookAt(None, None), turned)
-    assert steps[4].heading_commands == (seen,)
-    assert (steps[5].step, steps[5].heading_commands) == (Delay(0.0), (LookAt(None, None),)), (
-        "held as it turns"
-    )
+    assert steps[3].aims == ((5, LookAt(None, None)), (6, turned))
+    assert steps[4].aims == ((8, seen),)
+    assert (steps[5].step, steps[5].aims) == (Delay(0.0), ((10, LookAt(None, None)),)), "held as it turns"
 
 
 @pytest.mark.parametrize("last", [item(21), item(20)])
@@ -537,13 +536,13 @@ def test_behind_what_lands_the_nose_is_not_turned(last: WireItem) -> None:
     items = [item(22, frame=6, z=4.0), item(115, 90.0), last, item(197)]
     steps = located_steps(items, HOME)
     assert [one.last for one in steps] == [0, 2]
-    assert steps[1].heading_commands == (TurnHeading(0.0),)
+    assert steps[1].aims == ((1, TurnHeading(0.0)),)
 
 
 def test_jumps_without_end_turn_the_nose_each_time() -> None:
     items = [item(22, frame=6, z=4.0), item(93, 2.0), item(115, 90.0), item(177, 1.0, -1.0)]
     steps = located_steps(items, HOME)
-    assert [one.heading_commands for one in steps] == [(), (), (TurnHeading(0.0),)]
+    assert [one.aims for one in steps] == [(), (), ((2, TurnHeading(0.0)),)]
     assert steps[2].then == 1
     assert read_items(items, HOME)[1][-1] == (3, 1, 0), "the jump does not lead to the hold before it"
 

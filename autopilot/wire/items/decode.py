@@ -162,7 +162,7 @@ class _Reader:
         self._terms: list[Term] = []
         self._points: list[TrajectoryPoint] = []
         self._first = self._last = 0  # items of the terms or points so far
-        self._heading_commands: dict[int, HeadingCommand] = {}  # of the next step, by their items
+        self._aims: dict[int, HeadingCommand] = {}  # of the next step, by their items
         self._state = ANYWHERE  # after the steps so far
         self._stretch_begin = 0  # number of steps before those that follow one another now
 
@@ -175,7 +175,7 @@ class _Reader:
         row = COMMAND[item.command]
         context = ItemContext(seq, item, self._home, self._state, row)
         if row.heading_command is not None:
-            self._heading_commands[seq] = row.heading_command(context)
+            self._aims[seq] = row.heading_command(context)
             return
         if item.command not in (_TERM, _FACTOR, _RUN):
             self._expect_no_terms(seq - 1)
@@ -209,9 +209,9 @@ class _Reader:
         self.end_step(seq)
         lands = Land if then not in (None, END) else Land | ReturnHome
         # a hold in which the nose turns if no step follows, unless the mission lands anyway
-        if self._heading_commands and self.steps and not isinstance(self.steps[-1].step, lands):
+        if self._aims and self.steps and not isinstance(self.steps[-1].step, lands):
             self._add(LocatedStep(seq, seq, Delay(0.0)))
-        self._heading_commands = {}
+        self._aims = {}
         if then is not None and len(self.steps) > self._stretch_begin:
             self.steps[-1] = self.steps[-1]._replace(then=then)
             self._state = self._state.behind_loop()
@@ -247,10 +247,9 @@ class _Reader:
         return step + 1 if then is None else then
 
     def _add(self, located: LocatedStep) -> None:
-        if self._heading_commands and not isinstance(located.step, Takeoff):  # on the ground no nose turns
-            commands, items = tuple(self._heading_commands.values()), tuple(self._heading_commands)
-            located = located._replace(heading_commands=commands, heading_items=items)
-            self._heading_commands = {}
+        if self._aims and not isinstance(located.step, Takeoff):  # on the ground no nose turns
+            located = located._replace(aims=tuple(self._aims.items()))
+            self._aims = {}
         self.steps.append(located)
         self._state = state_after(located.step, self._state, self._return_to)
 

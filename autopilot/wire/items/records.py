@@ -38,8 +38,8 @@ class LocatedStep(NamedTuple):
     first: int
     last: int
     step: Step
-    heading_commands: tuple[HeadingCommand, ...] = ()  # given one after the other as the step begins
-    heading_items: tuple[int, ...] = ()  # the item of each of them
+    # the heading commands given one after the other as the step begins, each with its item
+    aims: tuple[tuple[int, HeadingCommand], ...] = ()
     # index of the step that follows instead of the next one, to which a jump without end leads, or END; the
     # next one begins wherever the loop is left
     then: int | None = None
