@@ -170,9 +170,9 @@ class MissionService:
         kind, count = message.mission_type, message.count
         if kind != _MISSION and kind not in _AREAS:
             return [_ack(peer, mavlink.MAV_MISSION_UNSUPPORTED, kind)]
-        ended = self._end_silent_upload(peer, now_us)
-        if self._upload and self._upload.peer != peer:
-            return _refused_as_busy(self._upload, peer, kind)
+        may_upload, ended = self._priority(peer, kind, now_us)
+        if not may_upload:
+            return ended
         self._upload = None
         return [*ended, *self._begin_upload(kind, count, peer, now_us, decide)]
 
@@ -238,12 +238,17 @@ class MissionService:
         cancelled = _ack(upload.peer, mavlink.MAV_MISSION_OPERATION_CANCELLED, upload.kind)
         return [SendText(mavlink.MAV_SEVERITY_WARNING, why), cancelled]
 
-    def _end_silent_upload(self, peer: Peer, now_us: int) -> list[Output]:
-        """Cancel an upload whose client was silent for long, as another one (`peer`) wants to transfer."""
+    def _priority(self, peer: Peer, kind: int, now_us: int) -> tuple[bool, list[Output]]:
+        """Whether the peer may upload or clear now, and what is sent because of an upload of another client:
+        one whose client was silent for long is cancelled, any other goes first."""
         upload = self._upload
-        if upload is None or upload.peer == peer or now_us - upload.heard_us < TAKEOVER_US:
-            return []
-        return self._cancel_upload(upload, now_us)
+        if upload is None or upload.peer == peer:
+            return True, []
+        if now_us - upload.heard_us >= TAKEOVER_US:
+            return True, self._cancel_upload(upload, now_us)
+        text = f"Upload denied: {upload.peer.name} uploads; try again"
+        refusal = SendText(mavlink.MAV_SEVERITY_WARNING, text, _upload_of(kind), peer.link)
+        return False, [refusal, _ack(peer, mavlink.MAV_MISSION_DENIED, kind)]
 
     def _receive_item(
         self,
@@ -405,9 +410,9 @@ class MissionService:
         kind = message.mission_type
         if kind not in (_MISSION, _ALL, *_AREAS):
             return [_ack(peer, mavlink.MAV_MISSION_UNSUPPORTED, kind)]
-        ended = self._end_silent_upload(peer, now_us)
-        if self._upload and self._upload.peer != peer:
-            return _refused_as_busy(self._upload, peer, kind)
+        may_clear, ended = self._priority(peer, kind, now_us)
+        if not may_clear:
+            return ended
         refused = [] if kind in _AREAS else self._refusal((), 0, peer, decide, kind)
         if refused:
             return [*ended, *refused]
@@ -520,13 +525,6 @@ def _upload_of(kind: int) -> tuple[str, int]:
 def _ack(peer: Peer, result: int, kind: int = _MISSION, number: int = 0) -> Output:
     answer = mavlink.MAVLink_mission_ack_message(peer.system, peer.component, result, kind, opaque_id=number)
     return Send(peer.link, answer)
-
-
-def _refused_as_busy(upload: _Upload, peer: Peer, kind: int) -> list[Output]:
-    """The answer to a client that would upload or clear while another one uploads."""
-    text = f"Upload denied: {upload.peer.name} uploads; try again"
-    refusal = SendText(mavlink.MAV_SEVERITY_WARNING, text, _upload_of(kind), peer.link)
-    return [refusal, _ack(peer, mavlink.MAV_MISSION_DENIED, kind)]
 
 
 def _refused_item(peer: Peer, text: str | None, result: int, kind: int = _MISSION) -> list[Output]:
