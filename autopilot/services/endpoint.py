@@ -552,10 +552,12 @@ class VehicleEndpoint:
     def _send_text(self, text: SendText) -> None:
         """Send a text to all links, a refusal only to those that have not just had it."""
         now_us = self._now_us + self._paused_us
-        self.kept_texts.keep(text.severity, text.text, now_us, text.subject)
-        if self.on_text is not None and self._is_news(text, None, now_us):
-            self.on_text(text.severity, text.text)
+        is_logged = self._is_news(text, None, now_us)
         states = [state for link, state in self._links.items() if self._is_news(text, link, now_us)]
+        if is_logged or states or self.kept_texts.holds(text.text):
+            self.kept_texts.keep(text.severity, text.text, now_us, text.subject)
+        if is_logged and self.on_text is not None:
+            self.on_text(text.severity, text.text)
         if not states:
             return
         for message in self._texts.messages(text.severity, text.text):
@@ -568,7 +570,7 @@ class VehicleEndpoint:
         if text.asker is None:
             return True
         interval_us = REASON_INTERVAL_US if link == text.asker else WARNING_INTERVAL_US
-        return self._refusals.allows((link, text.text), now_us, interval_us)
+        return self._refusals.allows(text.text, now_us, interval_us, link)
 
     # ---- links
 

@@ -44,6 +44,10 @@ class KeptTexts:
         """The kept texts, the oldest first."""
         return tuple(KeptText(now_us, *entry) for entry, now_us in self._texts.items())
 
+    def holds(self, text: str) -> bool:
+        """Whether this text is kept, with any severity."""
+        return any(kept == text for _, kept in self._texts)
+
     def keep(self, severity: int, text: str, now_us: int, subject: Hashable = None) -> None:
         """Keep a text that is sent now, perhaps a refusal of `subject`; the oldest text may be dropped."""
         entry = severity, text

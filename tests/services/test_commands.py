@@ -620,6 +620,24 @@ def test_another_refusal_and_a_new_link_are_told_at_once(rig):
     assert texts == {"gcs": [second], "new": [first, second]}
 
 
+def test_refusals_with_other_numbers_each_time_are_told_no_more_often_than_equal_ones(rig):
+    """Nor do they push out the texts that are kept."""
+    rig.endpoint.add_link("other")
+    rig.endpoint.send_text(mavlink.MAV_SEVERITY_WARNING, "kept")
+    told = {"gcs": [], "other": []}
+    mode = 0
+    while rig.now_us < 10_000_000:
+        mode += 1
+        set_mode = mavlink.MAVLink_set_mode_message(1, 1, mode << 16)
+        rig.send(set_mode if mode % 2 else long(176, (1, 77 + mode % 100)))
+        for link, received in rig.poll().items():
+            told[link] += [r.message.text for r in received if r.message.get_type() == "STATUSTEXT"]
+    refused = [text for text in told["gcs"] if "unknown" in text]
+    assert refused == [text for text in told["other"] if "unknown" in text]
+    assert len(set(refused)) == len(refused) == 10, "five in five seconds"
+    assert "kept" in [text.text for text in rig.endpoint.kept_texts.texts]
+
+
 def test_the_reasons_of_prearm_checks_are_told_as_often_as_asked(rig):
     rig.verdict = lambda request: Verdict(OK, "battery nearly empty", warns=True)
     for _ in range(3):
