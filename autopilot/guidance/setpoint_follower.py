@@ -115,10 +115,15 @@ class PositionSetpoint:
         if not all(map(isnan, self.accel)):
             return self
         # smoothing lags by its time constant, for which the rate makes up
-        smoothed_before = axpy(-ACCEL_SMOOTHING_S, j, a)
+        smoothed_before = before.smoothed_accel
         smoothed = smoothed_rate(smoothed_before, change, elapsed_s, share)
         rate = smoothed_rate(j, sub(smoothed, smoothed_before), elapsed_s, share)
         return replace(self, accel=axpy(ACCEL_SMOOTHING_S, rate, smoothed), accel_rate=rate)
+
+    @property
+    def smoothed_accel(self) -> Vec3:
+        """The acceleration of the velocities of a path, before what makes up for the lag of its smoothing."""
+        return axpy(-ACCEL_SMOOTHING_S, self.accel_rate, _nan_to_zero(self.accel))
 
     @property
     def is_fixed_position(self) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -10,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from autopilot.geometry.linear import ZERO, norm, sub
+from autopilot.geometry.linear import ZERO, Vec3, norm, sub
 from autopilot.guidance.heading import FacePoint
 from autopilot.guidance.setpoint_follower import (
     UNSPECIFIED,
@@ -114,6 +115,57 @@ def test_a_circle_of_positions_with_velocities_is_flown_on_its_radius() -> None:
         sky.tick()
         if k > 700:
             assert math.hypot(sky.view.x_load[0], sky.view.x_load[1]) == pytest.approx(5.0, abs=0.02)
+
+
+def limits_told(request_at: Callable[[float], FollowSetpoint], seconds: float) -> set[str | None]:
+    """What is said of a stream that is followed."""
+    sky = offboard(request_at(0.0))
+    told = set()
+    for number in range(round(seconds * 1e6 / STEP_US)):
+        told.add(sky.ask(request_at(number * STEP_US * 1e-6)).text)
+        sky.tick()
+    return told
+
+
+@pytest.mark.parametrize(
+    ("speed_m_s", "text"), [(1.6, None), (2.0, "Setpoint limited: over 1.5 m/s^2 (MIS_ACCEL)")]
+)
+def test_a_path_that_needs_more_than_the_greatest_acceleration_is_told_of(
+    speed_m_s: float, text: str | None
+) -> None:
+    """A circle of 2 m at 1.6 and at 2 m/s, by positions and velocities; its beginning is a step of the
+    velocity."""
+
+    def on_circle(t: float) -> FollowSetpoint:
+        c, s = math.cos(0.5 * speed_m_s * t), math.sin(0.5 * speed_m_s * t)
+        return at(2.0 * c, 2.0 * s, 2.0, velocity=(-speed_m_s * s, speed_m_s * c, 0.0))
+
+    assert limits_told(on_circle, 8.0) == {None, text}
+
+
+@pytest.mark.parametrize(
+    ("velocity", "accel", "text"),
+    [
+        ((3.0, 4.0, UNSPECIFIED[0]), UNSPECIFIED, None),
+        ((3.0, 4.0, 3.0), UNSPECIFIED, "Setpoint limited: over 5 m/s (MPC_XY_VEL_MAX)"),
+        ((1.0, 0.0, 0.0), (1.5, 0.0, 0.0), None),
+        ((1.0, 0.0, 0.0), (0.0, 1.5, 1.0), "Setpoint limited: over 1.5 m/s^2 (MIS_ACCEL)"),
+    ],
+)
+def test_a_velocity_or_acceleration_beyond_its_limit_is_told_of(
+    velocity: Vec3, accel: Vec3, text: str | None
+) -> None:
+    request = FollowSetpoint(UNSPECIFIED, velocity, accel, False)
+    assert limits_told(lambda _: request, 0.1) == {text}
+    held = Sky().airborne()
+    assert held.ask(request).text is None, "while it is not followed"
+
+
+def test_a_velocity_that_changes_at_once_is_not_told_of() -> None:
+    steps = [moving(0.5 * (step % 2), 0.0, 0.0) for step in range(5)]
+    assert limits_told(lambda t: steps[int(t / 2.0)], 9.0) == {None}
+    places = [at(0.0, 0.0, 2.0, velocity=(0.6 * (step % 2), 0.0, 0.0)) for step in range(5)]
+    assert limits_told(lambda t: places[int(t / 2.0)], 9.0) == {None}
 
 
 def test_a_relative_setpoint_is_from_where_the_load_is() -> None:

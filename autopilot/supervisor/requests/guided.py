@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from math import cos, isnan, pi, sin
+from math import cos, hypot, isnan, pi, sin
 from typing import Any
 
 from autopilot.geometry.linear import E3, Vec3, add, scale
@@ -15,6 +15,7 @@ from autopilot.guidance.setpoint_follower import (
     PositionSetpoint,
     SetpointStream,
 )
+from autopilot.services.records import Verdict
 from autopilot.services.requests import FollowAttitude, FollowRates, FollowSetpoint, FollowStick, SetMode
 from autopilot.supervisor.machine import requested_transition
 from autopilot.supervisor.motion import commanded_motion
@@ -33,6 +34,7 @@ from autopilot.supervisor.state import (
 )
 
 _ATTITUDE_REFUSED = denied("Attitude setpoint refused: the load is released, fly by position")
+LIMIT_TOLERANCE = 1.05  # beyond a limit, for rounding and for a velocity that is stepped once
 STREAM_US = 500_000  # a stream counts as present while its last setpoint is no older: two a second
 
 
@@ -118,7 +120,28 @@ def follow_setpoint(flight: Flight, request: FollowSetpoint, view: View, setting
         request.yaw_rate_rad_s,
     )
     setpoint = setpoint.after(flight.setpoints.offboard.setpoint, settings.motion.accel_m_s2)
-    return _accept_setpoint(flight, setpoint, view, settings), ACCEPTED
+    flight = _accept_setpoint(flight, setpoint, view, settings)
+    if flight.phase != Phase.GUIDED or flight.setpoints.source != SetpointSource.OFFBOARD:
+        return flight, ACCEPTED
+    text = _limit_text(setpoint, all(map(isnan, request.accel)), settings)
+    return flight, Verdict(ACCEPTED.result, text, warns=text is not None)
+
+
+def _limit_text(setpoint: PositionSetpoint, derives_accel: bool, settings: Settings) -> str | None:
+    """Which limit a setpoint exceeds that is followed; `derives_accel`: its acceleration is that of the
+    velocities before it."""
+    max_speed_m_s, max_accel_m_s2 = settings.setpoints.max_speed_m_s, settings.motion.accel_m_s2
+    if _size(setpoint.velocity) > LIMIT_TOLERANCE * max_speed_m_s:
+        return f"Setpoint limited: over {max_speed_m_s:g} m/s (MPC_XY_VEL_MAX)"
+    accel = setpoint.smoothed_accel if derives_accel else setpoint.accel
+    if _size(accel) > LIMIT_TOLERANCE * max_accel_m_s2:
+        return f"Setpoint limited: over {max_accel_m_s2:g} m/s^2 (MIS_ACCEL)"
+    return None
+
+
+def _size(v: Vec3) -> float:
+    """The length of a vector of which a component that is NaN does not count."""
+    return hypot(*(value for value in v if not isnan(value)))
 
 
 def _accept_setpoint(
