@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from math import cos, inf, nextafter, pi
+from math import inf, nextafter
 from typing import NamedTuple
 
 import numpy as np
@@ -41,7 +41,7 @@ from autopilot.trajectory.load_path import (
 )
 from autopilot.trajectory.peaks import Body
 from autopilot.trajectory.rotor_demand import Bounds, demand
-from autopilot.trajectory.signals import REST, Jet
+from autopilot.trajectory.signals import REST, Jet, risen_share
 from autopilot.trajectory.splines import ORDERS, Array, Basis, PieceTable, evaluate_piece, find_piece
 from missions.model import LoadPath, Signals
 
@@ -358,7 +358,7 @@ def _path_constraints(
             continue
         axis = "xyz".index(term.axis)
         time = term.start_s + term.rise_90_by_s
-        share_done = 0.5 - 0.5 * cos(pi * min(term.rise_90_by_s / term.rise_s, 1.0))
+        share_done = risen_share(term.rise_90_by_s, term.rise_s)
         requested_position = float(requested_jets(tables, step.duration_s, np.array([time]))[0, 0, axis])
         bound = requested_position + (0.9 - share_done) * term.amplitude_m - origin[axis]
         times.append(time)

@@ -51,6 +51,11 @@ def _product(terms: Iterable[_Cosine], factors: Sequence[_Cosine]) -> tuple[_Cos
     )
 
 
+def risen_share(elapsed_s: float, duration_s: float) -> float:
+    """The share of a rise or fall of a term that is made after so long."""
+    return 0.5 - 0.5 * cos(pi * min(elapsed_s / duration_s, 1.0))
+
+
 def _half_cosine(begin_s: float, duration_s: float, sign: float) -> tuple[_Cosine, ...]:
     """(1 - sign cos(pi (t - begin) / duration)) / 2: rises for sign = 1, falls for sign = -1."""
     omega = pi / duration_s

@@ -7,10 +7,11 @@ from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
 from itertools import groupby
-from math import cos, dist, floor, inf, pi
+from math import dist, floor, inf
 
 from autopilot.trajectory.feasibility import PathReport, VehicleLimits, Violation, paths
 from autopilot.trajectory.route import PlanError, Planner
+from autopilot.trajectory.signals import risen_share
 from autopilot.trajectory.timeline import TimelineEntry
 from autopilot.trajectory.transfer import reachable_speed, transfer_duration
 from autopilot.vehicle.file import belief_of
@@ -165,7 +166,7 @@ def cut_off_notes(mission: Mission) -> Iterator[str]:
             ):
                 if not begin_s < step.duration_s < begin_s + length_s:
                     continue
-                share = 0.5 - 0.5 * cos(pi * (step.duration_s - begin_s) / length_s)
+                share = risen_share(step.duration_s - begin_s, length_s)
                 if share < MIN_MOVED_SHARE:
                     yield (
                         f"{label}: {name}_s = {length_s:g} is cut off by the {end}, after "
