@@ -12,12 +12,12 @@ from typing import NamedTuple
 import numpy as np
 
 from autopilot.vehicle.file import load_truth_and_belief
+from autopilot.vehicle.low_battery import REACTIONS
 from autopilot.vehicle.parameters import AutopilotParameters
 from sitl.plant.drive import EXHAUSTED_SHARE, FULL, discharged, share_left
 from sitl.vehicles.truth import truth_of
 
 _STEP_S = 1.0
-_REACTIONS = {2: "lands", 3: "returns"}  # by COM_LOW_BAT_ACT
 
 
 class Charge(NamedTuple):
@@ -50,9 +50,9 @@ def charge_warning(left: float, table: AutopilotParameters) -> str | None:
     low, critical = table["BAT_LOW_THR"], table["BAT_CRIT_THR"]
     if left >= low:
         return None
-    reaction = _REACTIONS.get(int(table["COM_LOW_BAT_ACT"]))
+    reaction = REACTIONS.get(int(table["COM_LOW_BAT_ACT"]))
     if reaction is not None and left < critical:
-        then = f"the vehicle {reaction} at {100.0 * critical:.0f} % (BAT_CRIT_THR, COM_LOW_BAT_ACT)"
+        then = f"the vehicle {reaction.critical}s at {100.0 * critical:.0f} % (BAT_CRIT_THR, COM_LOW_BAT_ACT)"
     else:
         then = f"the vehicle warns from {100.0 * low:.0f} % on (BAT_LOW_THR)"
     return f"warning: battery: {then}"

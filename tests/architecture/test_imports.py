@@ -157,7 +157,13 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
         "sitl.sensors.overrides",
         "sitl.vehicles",
     ),
-    "gcs.workflows.charge": (*GCS, "gcs", "sitl.plant.drive", "sitl.vehicles"),
+    "gcs.workflows.charge": (
+        *GCS,
+        "gcs",
+        "sitl.plant.drive",
+        "sitl.vehicles",
+        "autopilot.vehicle.low_battery",
+    ),
     "gcs.workflows.wind": (
         *GCS,
         "gcs",
