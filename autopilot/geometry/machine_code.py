@@ -20,7 +20,7 @@ from contextlib import suppress
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
-from tempfile import NamedTemporaryFile
+from tempfile import NamedTemporaryFile, TemporaryDirectory
 
 from platformdirs import user_cache_path
 
@@ -28,7 +28,8 @@ ROOT = Path(__file__).resolve().parents[2]
 _DAY_S = 86400.0
 RETENTION_S = 90.0 * _DAY_S  # how long unused machine code is kept
 _MARKS = "ready"
-USER_CACHE_DIR = os.environ.get("NUMBA_CACHE_DIR", "")
+CACHE_VARIABLE = "NUMBA_CACHE_DIR"  # environment variable that names the folder of machine code
+KEEPING_HINT = f"to keep it, let {CACHE_VARIABLE} name a folder that can be written"
 _PACKAGES = ("autopilot", "sitl", "missions", "gcs", "plumbline")
 # begins with literal letters, which are searched fast; matches inside a text do no harm
 _IMPORT = re.compile(
@@ -105,7 +106,8 @@ def sources_hash(path: Path, root: Path = ROOT) -> str:
 
 def _kernels() -> Path:
     """The folder of all machine code, in the user's cache or in the folder that NUMBA_CACHE_DIR names."""
-    cache = Path(USER_CACHE_DIR) / "plumbline" if USER_CACHE_DIR else user_cache_path("plumbline")
+    named = os.environ.get(CACHE_VARIABLE)
+    cache = Path(named) / "plumbline" if named else user_cache_path("plumbline")
     return cache / "kernels"
 
 
@@ -156,13 +158,23 @@ def _mark(source: Path, part: str) -> Path:
 
 
 def storage_problem() -> str:
-    """Why machine code cannot be stored, so that each program compiles again; empty if it can be stored."""
+    """Where and why machine code cannot be stored; empty if it can be stored."""
     try:
         _marks().mkdir(parents=True, exist_ok=True)
         with NamedTemporaryFile(dir=_marks()):
             return ""
     except OSError as error:
         return f"{_marks().parent}: {error.strerror}"
+
+
+_temporary_folders: list[TemporaryDirectory[str]] = []  # each is deleted when this process ends
+
+
+def use_temporary_folder() -> None:
+    """From now on, store the machine code of this process, and of those that it starts, in a folder that is
+    deleted when this process ends."""
+    _temporary_folders.append(TemporaryDirectory(prefix="plumbline-"))
+    os.environ[CACHE_VARIABLE] = _temporary_folders[-1].name
 
 
 def is_ready(source: Path, parts: Iterable[str]) -> bool:

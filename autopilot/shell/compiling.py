@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from autopilot.geometry.machine_code import ROOT, is_ready, mark_ready
+from autopilot.geometry.machine_code import KEEPING_HINT, ROOT, is_ready, mark_ready, storage_problem
 from autopilot.vehicle.parameters import LAWS
 
 COMPILING_TEXT = (
@@ -99,6 +99,9 @@ class Compilation:
         self._stop: Callable[[], None] = lambda: None
         if self.was_needed:
             notify(COMPILING_TEXT)
+            not_kept_reason = storage_problem()
+            if not_kept_reason:
+                notify(f"{not_kept_reason}; the machine code cannot be kept there; {KEEPING_HINT}")
             return
 
         def announce(_: Any) -> None:

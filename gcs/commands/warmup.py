@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import click
 
+from autopilot.geometry.machine_code import KEEPING_HINT, storage_problem
+from autopilot.shell.compiling import ready
 from autopilot.vehicle.parameters import LAWS
 from gcs.commands.options import law_option
+from gcs.errors import GcsError
 
 
 @click.command("warmup")
@@ -29,4 +32,8 @@ def warmup_command(law: str, all_laws: bool, sweeps: bool, quiet: bool) -> None:
     from gcs.workflows.warmup import all_sweep_parts, in_process_parts, warm_up
 
     laws = LAWS if all_laws else (law,)
-    warm_up([*in_process_parts(laws), *(all_sweep_parts(laws) if sweeps else ())], quiet)
+    parts = [*in_process_parts(laws), *(all_sweep_parts(laws) if sweeps else ())]
+    problem = "" if ready(parts) else storage_problem()
+    if problem:
+        raise GcsError(f"{problem}; the machine code cannot be kept there; {KEEPING_HINT}")
+    warm_up(parts, quiet)

@@ -19,6 +19,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
 
+from autopilot.geometry.machine_code import CACHE_VARIABLE
 from autopilot.shell.options import ARGUMENTS_ON_STDIN
 from gcs.errors import GcsError
 from gcs.shell.display import notify
@@ -49,6 +50,7 @@ class Child:
         """With `is_preloaded` it is a program of Plumbline, which waits for its arguments (`start_with`)."""
         self.name = name
         self.log = log
+        self._machine_code_folder = os.environ.get(CACHE_VARIABLE)
         self.exit_code: int | None = None
         with log.open("wb") as stderr:
             self._process = subprocess.Popen(
@@ -64,9 +66,14 @@ class Child:
             )
 
     def start_with(self, arguments: Sequence[str], log: Path) -> bool:
-        """Let it start with these arguments and write to this file; False if it ended while it waited."""
+        """Let it start with these arguments and write to this file; False if it has ended, or is ended now
+        because it would not find what was compiled while it waited."""
         pipe = self._process.stdin
         if pipe is None or not self.running:
+            return False
+        if os.environ.get(CACHE_VARIABLE) != self._machine_code_folder:
+            self._process.kill()  # it waits for a line, and has done nothing yet
+            self._process.wait()
             return False
         log.write_bytes(b"")
         self.log = log

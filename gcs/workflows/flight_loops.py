@@ -22,6 +22,7 @@ _WAIT_S = 0.2
 _TICK_S = 0.01  # on the wall clock; not at each datagram, to leave the cores to punctual processes
 START_LIMIT_S = 60.0  # a start takes some seconds on an idle machine; all kernels are compiled before
 BUSY_CHECK_S = 3.0  # of silence, after which it is checked whether the autopilot is computing
+START_CHECK_S = 10.0  # the same before the start, which is itself computing
 SILENCE_LIMIT_S = 20.0  # of a vehicle in lockstep that has sent before
 STALL_LIMIT_S = 60.0  # without progress of the clock of a vehicle that sends; no load delays it so long
 
@@ -72,7 +73,8 @@ def run_lockstep(
     """Fly until the client has its outcome. `on_first_message` is called at the vehicle's first question.
 
     If a process ends before that, NoVehicleError is raised; if one ends later, that is an outcome. An
-    autopilot that is silent while it `is_busy` is computing what was requested; the loop waits for it.
+    autopilot that is silent while it `is_busy` is compiling or computing what was requested; the loop waits
+    for it.
     `own_code` names the user's classes, for whose answers an idle autopilot may be waiting.
     """
     turns = LockstepTurns()
@@ -89,16 +91,14 @@ def run_lockstep(
         if stop:
             client.interrupt()
         elif not datagrams:
-            limit_s = SILENCE_LIMIT_S if started else START_LIMIT_S
+            limit_s, check_s = (SILENCE_LIMIT_S, BUSY_CHECK_S) if started else (START_LIMIT_S, START_CHECK_S)
             reason = end_reason()
             silent_s = time.monotonic() - last_received_s
-            if started and silent_s > BUSY_CHECK_S and is_busy():
+            if silent_s > check_s and is_busy():
                 if not wait_reported:
                     own_work = f"an answer of {' or '.join(own_code)}, or " if own_code else ""
-                    notify(
-                        f"waiting for the autopilot, which is computing (for example {own_work}"
-                        "shaping a difficult path)"
-                    )
+                    work = "shaping a difficult path" if started else "compiling before it starts"
+                    notify(f"waiting for the autopilot, which is computing (for example {own_work}{work})")
                 wait_reported, last_busy_s = True, time.monotonic()
             if not reason and time.monotonic() - max(last_received_s, last_busy_s) > limit_s:
                 awaited = f", perhaps waiting for {' or '.join(own_code)}" if own_code else ""

@@ -8,11 +8,17 @@ import time
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from autopilot.geometry.machine_code import ROOT, drop_unused, storage_problem
+from autopilot.geometry.machine_code import (
+    KEEPING_HINT,
+    ROOT,
+    drop_unused,
+    storage_problem,
+    use_temporary_folder,
+)
 from autopilot.shell.compiling import CABLE, SIMULATOR, Part, autopilot_parts
 from autopilot.vehicle.parameters import LAWS
 from autopilot.vehicle.shipped import VEHICLES
-from gcs.errors import GcsError
+from gcs.errors import GcsError, reason
 from gcs.shell.display import CompileDisplay, notify
 from gcs.shell.processes import Child, Processes
 from gcs.workflows.expected import duration_text, expected_s, remaining_s
@@ -68,22 +74,27 @@ def all_sweep_parts(laws: Sequence[str]) -> list[Part]:
 
 
 def warm_up(parts: Iterable[Part], quiet: bool = False) -> None:
-    """Compile those of these parts that are not compiled yet, the longest first."""
+    """Compile those of these parts that are not compiled yet, the longest first; if the machine code cannot
+    be kept, for this program alone, with a warning."""
     waiting = sorted((part for part in parts if not part.ready), key=lambda part: -part.cost_s)
     if not waiting:
         return
     total = len(waiting)
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     busy = os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
+    not_kept_reason = storage_problem()
+    if not_kept_reason:
+        notify(
+            f"{not_kept_reason}; the machine code cannot be kept there and is compiled for this run alone; "
+            f"{KEEPING_HINT}"
+        )
+        try:
+            use_temporary_folder()
+        except OSError as error:
+            raise GcsError(f"the machine code cannot be stored: {reason(error)}; {KEEPING_HINT}") from None
     if not quiet:
         expected = duration_text(expected_s([part.cost_s for part in waiting], cores))
         count = f"{total} parts" if total > 1 else waiting[0].title
-        not_kept_reason = storage_problem()
-        if not_kept_reason:
-            notify(
-                f"what is compiled cannot be kept ({not_kept_reason}), so that every command begins with it; "
-                "XDG_CACHE_HOME=FOLDER names a folder that can be written"
-            )
         once = "" if not_kept_reason else ", once"
         notify(f"compiling the flight software{once}: {count}, {expected} on an idle machine")
     with (

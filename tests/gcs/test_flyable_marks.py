@@ -19,7 +19,7 @@ BEBOP = files("autopilot.vehicle").joinpath("vehicles", "bebop.toml").read_text(
 @pytest.fixture(autouse=True)
 def nothing_known(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    monkeypatch.setattr("autopilot.geometry.machine_code.USER_CACHE_DIR", "")
+    monkeypatch.setenv("NUMBA_CACHE_DIR", "")
 
 
 def test_what_was_found_flyable_is_known_with_its_vehicle_and_its_shaping():

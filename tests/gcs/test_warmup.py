@@ -28,7 +28,7 @@ def part(mark: str, statement: str, cost_s: float = 1.0) -> Part:
 def nothing_compiled(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     monkeypatch.delenv("NUMBA_DISABLE_JIT", raising=False)
-    monkeypatch.setattr("autopilot.geometry.machine_code.USER_CACHE_DIR", "")
+    monkeypatch.setenv("NUMBA_CACHE_DIR", "")
 
 
 def test_a_flight_needs_its_law_alone():
@@ -140,11 +140,45 @@ def test_what_is_compiled_is_told_kernel_by_kernel(capsys):
     assert capsys.readouterr().err == f"gcs: compiling {kernels}; 2 of 5 remain\n"
 
 
-def test_what_cannot_be_kept_is_told_and_compiled_all_the_same(tmp_path, monkeypatch, capsys):
+@pytest.fixture
+def unwritable(tmp_path, monkeypatch):
+    """The folder of machine code, which cannot be made."""
     (tmp_path / "file").touch()
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
-    warm_up([part("tick", "pass")])
+    return tmp_path / "file" / "plumbline" / "kernels"
+
+
+def test_what_cannot_be_kept_is_compiled_once_into_a_folder_that_the_children_share(
+    unwritable, tmp_path, capsys
+):
+    seen = tmp_path / "seen"
+    parts = [
+        part(name, f"import os; print(os.environ['NUMBA_CACHE_DIR'], file=open({str(seen)!r}, 'a'))")
+        for name in ("tick", "world")
+    ]
+    warm_up(parts, quiet=True)
     said = capsys.readouterr().err
-    kernels = tmp_path / "file" / "plumbline" / "kernels"
-    assert said.startswith(f"gcs: what is compiled cannot be kept ({kernels}: Not a directory)")
-    assert "compiling the flight software: the tick" in said
+    assert said.count("\n") == 1
+    assert said.startswith(f"gcs: {unwritable}: Not a directory; the machine code cannot be kept there")
+    assert "let NUMBA_CACHE_DIR name a folder" in said
+    (folder,) = {Path(line) for line in seen.read_text().split()}
+    assert folder == Path(os.environ["NUMBA_CACHE_DIR"]) and list(folder.rglob("*-tick"))
+    assert all(one.ready for one in parts)
+    warm_up([*parts, part("later", "pass")], quiet=True)
+    assert capsys.readouterr().err == ""
+    assert len(seen.read_text().split()) == 2
+
+
+def test_without_any_folder_for_machine_code_nothing_is_compiled(unwritable, monkeypatch):
+    monkeypatch.setattr("tempfile.tempdir", str(unwritable))
+    with pytest.raises(GcsError, match=r"the machine code cannot be stored: .*let NUMBA_CACHE_DIR name"):
+        warm_up([part("tick", "pass")])
+
+
+def test_who_compiles_beforehand_is_told_that_it_would_be_lost(unwritable, monkeypatch):
+    result = CliRunner().invoke(gcs, ["warmup", "--quiet"])
+    assert result.exit_code == 1
+    told = f"gcs: {unwritable}: Not a directory; the machine code cannot be kept there; to keep it, let "
+    assert result.stderr.startswith(told)
+    monkeypatch.setattr(Part, "ready", True)
+    assert CliRunner().invoke(gcs, ["warmup", "--quiet"]).exit_code == 0, "nothing is to be compiled"

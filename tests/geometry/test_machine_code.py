@@ -131,7 +131,7 @@ def test_what_is_ready_is_known_by_its_sources_and_its_part(
 ) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     monkeypatch.delenv("NUMBA_DISABLE_JIT", raising=False)
-    monkeypatch.setattr(machine_code, "USER_CACHE_DIR", "")
+    monkeypatch.setenv("NUMBA_CACHE_DIR", "")
     source = Path(s2.__file__)
     assert not machine_code.is_ready(source, ("tick",))
     machine_code.mark_ready(source, ("tick", "law"))
@@ -146,7 +146,7 @@ def test_what_is_not_used_for_long_is_deleted_and_its_mark_before_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    monkeypatch.setattr(machine_code, "USER_CACHE_DIR", "")
+    monkeypatch.setenv("NUMBA_CACHE_DIR", "")
     source = Path(__file__)
     folder = machine_code.kernel_folder(source)
     other = folder.with_name("0123")
@@ -176,8 +176,23 @@ def test_a_directory_that_cannot_be_written_is_no_error(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "file").touch()
-    monkeypatch.setattr(machine_code, "USER_CACHE_DIR", str(tmp_path / "file"))
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "file"))
     monkeypatch.delenv("NUMBA_DISABLE_JIT", raising=False)
     source = Path(s2.__file__)
     machine_code.mark_ready(source, ("tick",))
     assert not machine_code.is_ready(source, ("tick",))
+
+
+def test_a_temporary_folder_of_machine_code_is_deleted_at_the_end_of_its_process() -> None:
+    program = f"""
+import os
+from autopilot.geometry.machine_code import mark_ready, storage_problem, use_temporary_folder
+use_temporary_folder()
+mark_ready({__file__!r}, ["tick"])
+assert not storage_problem() and any(os.scandir(os.environ["NUMBA_CACHE_DIR"]))
+print(os.environ["NUMBA_CACHE_DIR"])
+"""
+    ended = subprocess.run(
+        [sys.executable, "-c", program], cwd=ROOT, check=True, capture_output=True, text=True
+    )
+    assert not Path(ended.stdout.strip()).exists()

@@ -20,7 +20,7 @@ def part(mark: str) -> Part:
 @pytest.fixture(autouse=True)
 def nothing_compiled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    monkeypatch.setattr("autopilot.geometry.machine_code.USER_CACHE_DIR", "")
+    monkeypatch.setenv("NUMBA_CACHE_DIR", "")
 
 
 def compile_something() -> None:
@@ -36,6 +36,18 @@ def test_missing_parts_are_announced_at_once_and_marked_when_everything_is_compi
     compile_something()
     compilation.done()
     assert said == [COMPILING_TEXT] and parts[1].ready
+
+
+def test_machine_code_that_cannot_be_kept_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "file"))
+    said: list[str] = []
+    Compilation((part("one"),), said.append)
+    where = tmp_path / "file" / "plumbline" / "kernels"
+    assert said[0] == COMPILING_TEXT
+    assert said[1].startswith(
+        f"{where}: Not a directory; the machine code cannot be kept there; to keep it, "
+    )
 
 
 def test_a_kernel_that_no_part_has_is_announced_once_and_only_before_the_flight() -> None:

@@ -286,6 +286,26 @@ def test_an_autopilot_that_works_is_waited_for(
     assert capsys.readouterr().err.count(f"{waiting} {work}shaping a difficult path)") == 1
 
 
+def test_an_autopilot_that_compiles_before_it_starts_is_waited_for(items, tmp_path, monkeypatch, capsys):
+    for limit in ("START_LIMIT_S", "START_CHECK_S"):
+        monkeypatch.setattr(loops_module, limit, 0.05)
+    looked = []
+    client = FlightClient(items[:2] + items[-1:], 10.0)
+    path, display = tmp_path / "x.tlog", FlightDisplay("test", quiet=True)
+
+    def fly(is_busy, end_reason):
+        with UdpContext() as ground, UdpContext() as truth, StopRequest("") as stop, path.open("wb") as file:
+            link = (ground, truth, end_reason, display, stop, lambda: None)
+            run_lockstep(client, Capture(TlogWriter(file)), *link, is_busy=is_busy)
+
+    with pytest.raises(NoVehicleError, match="it has ended"):
+        fly(lambda: not looked.append(None), lambda: "it has ended" if len(looked) >= 3 else "")
+    told = "waiting for the autopilot, which is computing (for example compiling before it starts)"
+    assert capsys.readouterr().err.count(told) == 1
+    with pytest.raises(NoVehicleError, match="the autopilot has sent nothing for 0 s"):
+        fly(lambda: False, lambda: "")
+
+
 def test_an_idle_autopilot_may_wait_for_what_the_user_has_written(new_world, items, tmp_path, monkeypatch):
     monkeypatch.setattr(loops_module, "SILENCE_LIMIT_S", 0.05)
     scripted = new_world().vehicle
@@ -416,6 +436,16 @@ def test_a_loaded_program_that_has_ended_is_started_anew(tmp_path):
         child = processes.start("no_such_module", [], tmp_path / "log")
         assert child is not waiting and child.wait(WAIT_S)
         assert processes.end_reason().endswith("No module named no_such_module")
+
+
+def test_a_loaded_program_that_would_not_find_its_machine_code_is_started_anew(tmp_path, monkeypatch):
+    log = tmp_path / "log"
+    with Processes() as processes:
+        waiting = processes.load("sitl")
+        monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+        child = processes.start("sitl", ["--vehicle", "no such"], log)
+        assert child is not waiting and not waiting.running and child.wait(WAIT_S)
+    assert "sitl: unknown vehicle 'no such'" in log.read_text()
 
 
 def test_a_loaded_program_that_is_never_started_is_stopped():
