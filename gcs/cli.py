@@ -130,6 +130,10 @@ class Gcs(click.Group):
             code = EXIT_ERROR
         finally:
             restore_stdout()
+        if code == EXIT_INTERRUPTED:
+            from gcs.shell.stopping import stop_exit_code
+
+            code = stop_exit_code()
         sys.exit(code if isinstance(code, int) else EXIT_DONE)
 
 
@@ -163,6 +167,6 @@ def gcs(signing_key: bytes | None) -> None:
     and autopilot, or gcs fly --speed 1).
 
     Results are on stdout, everything else on stderr. Exit codes: 0 done, 1 a known error, 2 wrong input,
-    3 flown, but the mission was not completed, 4 flown, but a --require condition failed, 130 stopped by
-    Ctrl-C.
+    3 flown, but the mission was not completed, 4 flown, but a --require condition failed; stopped: 130 by
+    Ctrl-C, 143 by SIGTERM, 129 by SIGHUP (the terminal was closed).
     """

@@ -16,7 +16,7 @@ EXIT_ERROR = 1  # a known error, reported in one line
 EXIT_USAGE = 2  # the command line, or a file that it names, is wrong
 EXIT_NOT_MET = 3  # flown, but the mission was not completed
 EXIT_REQUIRED = 4  # a requirement of --require was not met
-EXIT_INTERRUPTED = 130  # stopped by Ctrl-C, the code that shells use
+EXIT_INTERRUPTED = 130  # stopped: by Ctrl-C, or another signal (`gcs.shell.stopping.stop_exit_code`)
 
 
 class GcsError(Error):

@@ -40,6 +40,7 @@ if TYPE_CHECKING:
 
 Values = Iterable[float] | str  # of a varied parameter
 _ERROR_PREFIX = "gcs: "  # begins the line of a known error
+_STOPPED = (EXIT_INTERRUPTED, *(128 + number for number in (signal.SIGTERM, signal.SIGHUP)))
 
 
 @called_by_scripts
@@ -268,7 +269,7 @@ def _run(arguments: list[str], quiet: bool) -> None:
         if not quiet:
             sys.stderr.write(last)
         return
-    if program.returncode == EXIT_INTERRUPTED:
+    if program.returncode in _STOPPED:
         raise KeyboardInterrupt
     kind = InputError if program.returncode == InputError.exit_code else GcsError
     reason = "; ".join(line.strip().removeprefix(_ERROR_PREFIX) for line in errors if line.strip())

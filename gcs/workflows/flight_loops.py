@@ -89,7 +89,7 @@ def run_lockstep(
     while client.outcome is None:
         datagrams = vehicle.wait(_WAIT_S)
         if stop:
-            client.interrupt()
+            client.interrupt(stop.reason)
         elif not datagrams:
             limit_s, check_s = (SILENCE_LIMIT_S, BUSY_CHECK_S) if started else (START_LIMIT_S, START_CHECK_S)
             reason = end_reason()
@@ -190,7 +190,7 @@ def run_wall_clock(
             on_first_message()
         _show(display, client)
         if stop:
-            client.interrupt()
+            client.interrupt(stop.reason)
         reason = end_reason() or clock.stall_reason(client.view.time_us, now_us * 1e-6)
         if reason and client.connection.target is None:
             raise NoVehicleError(reason)

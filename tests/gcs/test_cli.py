@@ -1022,8 +1022,9 @@ main()
     assert (found.returncode, found.stdout, found.stderr) == (EXIT_INTERRUPTED, "", "gcs: stopped\n")
 
 
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_a_flight_stopped_before_the_vehicle_was_armed_leaves_the_folder_to_the_next(
-    live, tmp_path, monkeypatch
+    live, tmp_path, monkeypatch, number, code
 ):
     vehicle, port = live
     vehicle.ready, asked, tick = False, [], vehicle.tick
@@ -1031,13 +1032,13 @@ def test_a_flight_stopped_before_the_vehicle_was_armed_leaves_the_folder_to_the_
     def stop(now_us):
         if vehicle.mission and not asked:
             asked.append(True)
-            os.kill(os.getpid(), signal.SIGINT)
+            os.kill(os.getpid(), number)
         return tick(now_us)
 
     monkeypatch.setattr(vehicle, "tick", stop)
     out = tmp_path / "out"
     result = run("fly", "hover", "--connect", port, "--out", str(out))
-    assert (result.exit_code, result.stdout) == (EXIT_INTERRUPTED, "")
+    assert (result.exit_code, result.stdout) == (code, "")
     told = f"stopped before the vehicle was armed; what it said is in {out / 'unflown.tlog'}"
     assert result.stderr.splitlines()[-1] == f"gcs: {told}"
     assert {path.name for path in out.iterdir()} == {"unflown.tlog", LOCK_FILE}

@@ -101,7 +101,7 @@ def test_a_closed_terminal_ends_a_flight_as_ctrl_c_does(tmp_path: Path) -> None:
         os.close(ours)
         flight.send_signal(signal.SIGHUP)
         flight.send_signal(signal.SIGHUP)
-        assert flight.wait(60.0) == 130
+        assert flight.wait(60.0) == 129
     finally:
         flight.kill()
         flight.wait()

@@ -10,7 +10,8 @@ from collections.abc import Iterator
 import pytest
 
 from autopilot.shell.options import CloseSafeStream, stop_signals
-from gcs.shell.stopping import StopRequest
+from gcs.errors import EXIT_INTERRUPTED
+from gcs.shell.stopping import StopRequest, stop_exit_code
 
 
 @pytest.fixture(autouse=True)
@@ -21,6 +22,8 @@ def _handlers() -> Iterator[None]:
     yield
     for number, handler in zip(numbers, before, strict=True):
         signal.signal(number, handler)
+    with StopRequest(""):
+        pass  # forgets the signals of the test
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
@@ -39,7 +42,32 @@ def test_a_closed_terminal_may_be_told_twice(capsys: pytest.CaptureFixture[str])
         for _ in range(3):
             os.kill(os.getpid(), signal.SIGHUP)
         assert stop
-    assert capsys.readouterr().err == "gcs: stopping\n"
+    assert capsys.readouterr().err == "gcs: SIGHUP (the terminal was closed): stopping\n"
+
+
+@pytest.mark.parametrize(
+    ("number", "code", "reason", "told"),
+    [
+        (signal.SIGINT, 130, "stopped by the user", "stopping"),
+        (signal.SIGTERM, 143, "stopped by SIGTERM", "SIGTERM: stopping"),
+        (
+            signal.SIGHUP,
+            129,
+            "stopped by SIGHUP (the terminal was closed)",
+            "SIGHUP (the terminal was closed): stopping",
+        ),
+    ],
+)
+def test_who_stopped_it_is_told_and_in_the_exit_code(
+    number: signal.Signals, code: int, reason: str, told: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    with StopRequest("stopping") as stop:
+        assert stop_exit_code() == EXIT_INTERRUPTED, "without a signal"
+        os.kill(os.getpid(), number)
+        assert (stop.reason, stop_exit_code()) == (reason, code)
+    assert capsys.readouterr().err == f"gcs: {told}\n"
+    assert stop_exit_code() == code
 
 
 def test_what_was_begun_to_outlive_its_terminal_does() -> None:
