@@ -18,12 +18,20 @@ def main() -> None:
     atexit.register(gc.freeze)  # otherwise Python would search all of them at exit, which takes 0.3 s
     try:
         from gcs.cli import gcs
-    except KeyboardInterrupt:  # from here on the command itself answers it
+
+        gcs(prog_name="gcs")
+    except ImportError:
+        from gcs.shadowing import shadowing_problem
+
+        problem = shadowing_problem()
+        if not problem:
+            raise
+        sys.exit(f"gcs: {problem}")
+    except KeyboardInterrupt:  # while it was loaded; the command itself answers the others
         from gcs.errors import EXIT_INTERRUPTED
 
         sys.stderr.write("gcs: stopped\n")
         sys.exit(EXIT_INTERRUPTED)
-    gcs(prog_name="gcs")
 
 
 if __name__ == "__main__":

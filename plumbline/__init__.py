@@ -17,29 +17,38 @@ from __future__ import annotations
 
 from importlib import import_module
 from importlib.metadata import version
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from missions.errors import Error
-from missions.model import (
-    AttitudeRun,
-    Delay,
-    Land,
-    PlaceLoad,
-    Release,
-    ReturnHome,
-    Signals,
-    Sine,
-    Speed,
-    Takeoff,
-    Term,
-    Trajectory,
-    Waypoint,
-    Winch,
-)
-from plumbline.flights import Flight, fly
-from plumbline.missions import Mission
-from plumbline.sweeps import sweep
-from plumbline.vehicles import Vehicle
+try:
+    from missions.errors import Error
+    from missions.model import (
+        AttitudeRun,
+        Delay,
+        Land,
+        PlaceLoad,
+        Release,
+        ReturnHome,
+        Signals,
+        Sine,
+        Speed,
+        Takeoff,
+        Term,
+        Trajectory,
+        Waypoint,
+        Winch,
+    )
+    from plumbline.flights import Flight, fly
+    from plumbline.missions import Mission
+    from plumbline.sweeps import sweep
+    from plumbline.vehicles import Vehicle
+except ImportError as error:
+    # by its path, because the package gcs may be the one that is hidden
+    from runpy import run_path
+
+    if problem := run_path(str(Path(__file__).parents[1] / "gcs" / "shadowing.py"))["shadowing_problem"]():
+        raise ImportError(problem) from error
+    raise
 
 if TYPE_CHECKING:
     from plumbline.running import RunningVehicle, connect
