@@ -84,9 +84,9 @@ def load_command(file: Path, address: Address) -> None:
     """Set all parameters in FILE.
 
     Reads `NAME value` lines (MAVProxy, Mission Planner) and QGroundControl's columns. A parameter that the
-    vehicle refuses is reported, and the others are set.
+    vehicle refuses or does not have is reported, and the others are set.
     """
     done, total = load_parameters(file, address)
     click.echo(f"{done} of {total} parameters set from {file}")
     if done < total:
-        raise GcsError(f"{total - done} of {total} parameters of {file} were refused")
+        raise GcsError(f"{total - done} of {total} parameters of {file} were refused; the others are set")

@@ -99,6 +99,8 @@ def load_parameters(file: Path, address: Address) -> tuple[int, int]:
         values = parse_text(text_of(file))
     except (TextFileError, ParameterError) as error:
         raise InputError(f"{file}: {error}") from None
+    if not values:
+        raise InputError(f"{file}: has no parameters; must have lines NAME value")
     refused = 0
     with Session(address) as session, StepDisplay("parameters") as display:
         target = session.find_to_command()

@@ -744,6 +744,17 @@ def test_parameters(live, tmp_path):
     assert vehicle.parameters == before
     file.write_text("P001 one\n")
     assert "must be NAME value" in one_line(run("param", "load", str(file), "--connect", port), EXIT_USAGE)
+    for empty in ("", "# nothing\n\n"):
+        file.write_text(empty)
+        told = one_line(run("param", "load", str(file), "--connect", port), EXIT_USAGE)
+        assert told == f"gcs: {file}: has no parameters; must have lines NAME value"
+    file.write_text("P001 3\nNOPE 1\nP002 4\n")
+    result = run("param", "load", str(file), "--connect", port)
+    assert (result.exit_code, result.stdout) == (EXIT_ERROR, f"2 of 3 parameters set from {file}\n")
+    each, total = result.stderr.splitlines()
+    assert each.startswith("gcs: NOPE: no such parameter; ")
+    assert total == f"gcs: 1 of 3 parameters of {file} were refused; the others are set"
+    assert (vehicle.parameters["P001"], vehicle.parameters["P002"]) == (3.0, 4.0)
 
 
 @pytest.mark.parametrize("program", ["gcs missions", "sitl --help", "autopilot --help"])
