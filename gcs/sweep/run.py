@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -13,7 +13,7 @@ from autopilot.shell.compiling import Part
 from gcs.batch.pool import PoolBackend
 from gcs.batch.progress import BatchDisplay
 from gcs.batch.runner import Running, fly_all
-from gcs.errors import GcsError, disk_problem, reason
+from gcs.errors import GcsError, disk_problem, reason, write_error
 from gcs.folders import PAGE_FILE, PLAN_FILE, check_no_other_results, make_folder, reserved
 from gcs.sweep.plan import SweepPlan
 from gcs.sweep.plan_file import store_plan, sweep_origin
@@ -64,16 +64,24 @@ def sweep(
             store.clear()
             (directory / PLAN_FILE).unlink(missing_ok=True)
         origin = sweep_origin(plan)
-        store_plan(directory, plan, command, origin)
         try:
-            return _fly_missing(plan, origin.settings["files"], store, workers, stopped, quiet, warm)
+            store_plan(directory, plan, command, origin)
         except OSError as error:
-            if not disk_problem(error):
-                raise
-            text = (
-                f"{directory}: {reason(error).lower()}; its flights are kept, and the same command continues"
-            )
-            raise GcsError(text) from None
+            raise write_error(error, directory) from None
+        with disk_problem_told(directory):
+            return _fly_missing(plan, origin.settings["files"], store, workers, stopped, quiet, warm)
+
+
+@contextmanager
+def disk_problem_told(directory: Path) -> Iterator[None]:
+    """Within the block, a failure of the disk becomes a GcsError that names the directory of the sweep."""
+    try:
+        yield
+    except OSError as error:
+        if not disk_problem(error):
+            raise
+        text = f"{directory}: {reason(error).lower()}; its flights are kept, and the same command continues"
+        raise GcsError(text) from None
 
 
 def _fly_missing(

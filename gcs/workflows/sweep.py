@@ -23,7 +23,7 @@ from gcs.sweep.plan_file import default_directory, default_folder, sweep_origin
 from gcs.sweep.plan_values import parse_seeds, parse_varied, varied_values
 from gcs.sweep.report import write_report
 from gcs.sweep.results import flights_by_law, law_record, share_record
-from gcs.sweep.run import SweepResult, sweep
+from gcs.sweep.run import SweepResult, disk_problem_told, sweep
 from gcs.sweep.standouts import (
     Standout,
     flight_settings,
@@ -162,7 +162,8 @@ def run_sweep(options: SweepOptions) -> Sweep:
         else:
             if not options.quiet:
                 notify("drawing the report")
-            result = write_report(directory, plan)
+            with disk_problem_told(directory):
+                result = write_report(directory, plan)
     flights = tuple(_standout_record(plan, one, directory) for one in found)
     of_laws = tuple(map(law_record, laws))
     return Sweep(Path(plan.mission).stem, counts, plan.flights, directory, result, flights, of_laws)

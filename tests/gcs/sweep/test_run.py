@@ -529,6 +529,29 @@ def test_a_damaged_table_is_told_in_one_line(
         swept(plan, tmp_path)
 
 
+def test_a_disk_that_is_full_before_or_after_the_flights_is_told_with_the_folder(
+    short: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    words = ["sweep", short, "--law", "thesis", "--jobs", "1", "--out", str(tmp_path / "out"), "--quiet"]
+
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "wrapped by a library")
+
+    def told(where: str) -> str:
+        with monkeypatch.context() as patch:
+            patch.setattr(where, full)
+            result = CliRunner().invoke(gcs, words, prog_name="gcs")
+        assert (result.exit_code, result.stderr.count("\n")) == (1, 1), result.output
+        return result.stderr.removeprefix(f"gcs: {tmp_path / 'out'}: ")
+
+    before = "No space left on device; free some space, or name another folder by --out\n"
+    assert told("gcs.sweep.run.store_plan") == before
+    after = "no space left on device; its flights are kept, and the same command continues\n"
+    assert told("gcs.workflows.sweep.write_report") == after
+    result = CliRunner().invoke(gcs, words, prog_name="gcs")
+    assert result.exit_code == 0 and (tmp_path / "out" / "report.html").is_file()
+
+
 def refused_sweep(short: str, directory: Path) -> str:
     """The line with which a sweep into this folder is refused."""
     words = ["sweep", short, "--jobs", "1", "--out", str(directory), "--quiet"]
