@@ -164,7 +164,7 @@ def tolerate_closed_terminal() -> None:
 
 
 class Stop(BaseException):
-    """SIGTERM, SIGINT or SIGHUP."""
+    """SIGTERM, SIGINT or SIGHUP; its text is the name."""
 
 
 class StopRequest:
@@ -175,6 +175,7 @@ class StopRequest:
     """
 
     requested = False
+    _name = ""
     _signals: tuple[signal.Signals, ...] = ()
 
     def __enter__(self) -> StopRequest:
@@ -187,13 +188,23 @@ class StopRequest:
         for number in self._signals:
             signal.signal(number, signal.SIG_IGN)  # once is enough
 
-    def _note(self, _signal: int, _frame: object) -> None:
-        self.requested = True
+    def _note(self, number: int, _frame: object) -> None:
+        self.requested, self._name = True, signal.Signals(number).name
 
     def check(self) -> None:
         """Raise Stop if a signal came."""
         if self.requested:
-            raise Stop
+            raise Stop(self._name)
+
+
+def print_stop(program: str, at_us: int, stopped_by: str, summary: str, quiet: bool) -> None:
+    """Print when and by which signal a program was stopped, and the summary of its work; if `quiet`, only the
+    former, unless it was Ctrl-C."""
+    text = f"{program}: stopped at t = {at_us / 1e6:.3f} s by {stopped_by}"
+    if not quiet:
+        print("; ".join(filter(None, (text, summary))), flush=True)
+    elif stopped_by != signal.SIGINT.name:
+        print(text, file=sys.stderr, flush=True)
 
 
 def set_timeout(sock: socket.socket, seconds: float) -> None:

@@ -43,6 +43,7 @@ from autopilot.shell.options import (
     address_text,
     os_error_text,
     print_errors,
+    print_stop,
     reduce_latency,
     send,
     set_timeout,
@@ -444,12 +445,12 @@ def fly(
         sys.exit(print_errors("autopilot", EXIT_USAGE, str(error)))
     except (AutopilotError, StorageError) as error:
         sys.exit(print_errors("autopilot", EXIT_ERROR, str(error)))
-    except Stop:
-        pass
+    except Stop as stopped:
+        stopped_by = str(stopped)
     finally:
         if program is not None:
             program.close()
         worker.close()
     if program is not None:
         cost = "" if lockstep else program.cost.summary()
-        notify("; ".join(filter(None, (f"stopped at t = {program.onboard.now_us / 1e6:.3f} s", cost))))
+        print_stop("autopilot", program.onboard.now_us, stopped_by, cost, quiet)

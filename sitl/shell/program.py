@@ -20,6 +20,7 @@ from autopilot.shell.options import (
     address_text,
     os_error_text,
     print_errors,
+    print_stop,
     reduce_latency,
 )
 from autopilot.vehicle.shipped import VehicleFileError
@@ -181,22 +182,21 @@ def simulate(
         sys.exit(print_errors("sitl", EXIT_USAGE, str(error)))
     except ValueError as error:
         sys.exit(print_errors("sitl", EXIT_ERROR, str(error)))
-    except Stop:
-        pass
+    except Stop as stopped:
+        stopped_by = str(stopped)
     finally:
         if link is not None:
             link.close()
     if simulator is not None and link is not None:
-        notify(_summary(simulator, real_time, pacing, link.served_s))
+        summary = _summary(simulator, real_time, pacing, link.served_s)
+        print_stop("sitl", simulator.now_us, stopped_by, summary, quiet)
 
 
 def _summary(simulator: HilSimulator, real_time: bool, pacing: Pacing, wall_s: float) -> str:
-    simulated_s = simulator.now_us / 1e6
-    text = f"stopped at t = {simulated_s:.3f} s; "
     if real_time:
-        text += pacing.summary(simulator.missed)
+        text = pacing.summary(simulator.missed)
     else:
-        text += f"{simulated_s / max(wall_s, 1e-9):.2f} x real time"
+        text = f"{simulator.now_us / 1e6 / max(wall_s, 1e-9):.2f} x real time"
     if simulator.rejected:
         text += f"; {simulator.rejected} commands were not numbers"
     if simulator.diverged:

@@ -104,7 +104,7 @@ def test_lockstep_over_udp(port: int, lockstep_sitl: subprocess.Popen[str]) -> N
     output, errors = lockstep_sitl.communicate(timeout=PATIENCE_S)
     assert lockstep_sitl.returncode == 0
     assert errors == ""
-    assert f"stopped at t = {(time_us + 4000) / 1e6:.3f} s" in output
+    assert f"stopped at t = {(time_us + 4000) / 1e6:.3f} s by SIGTERM; " in output
     assert output.count("is not served") == 1
     assert output.count("serving the autopilot at") == 2
 
