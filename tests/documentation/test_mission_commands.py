@@ -1,4 +1,4 @@
-"""docs/missions.md: its table of mission commands is the one by which the autopilot reads items.
+"""docs/mission-items.md: its table of mission commands is the one by which the autopilot reads items.
 
 To write the table anew: python tests/documentation/test_mission_commands.py > part, and put it in the page.
 """
@@ -16,7 +16,7 @@ from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import COMMANDS, Command, Handling, handling_of
 from missions.model import Sine, Step, Term, Trajectory, TrajectoryPoint
 
-PAGE = Path(__file__).parents[2] / "docs" / "missions.md"
+PAGE = Path(__file__).parents[2] / "docs" / "mission-items.md"
 HEAD = "| command | parameters | |\n|---|---|---|\n"
 WORDS = {Handling.FLOWN: "", Handling.KEPT: "kept: ", Handling.REFUSED: "refused: "}
 OTHERS = (

@@ -1,6 +1,6 @@
 """The mission commands: the parameters and the effect of each.
 
-Encoding, decoding and the table in docs/missions.md follow from these rows. A command without a row is
+Encoding, decoding and the table in docs/mission-items.md follow from these rows. A command without a row is
 refused if its number is at most MAV_CMD_NAV_LAST, because the user relies on being flown somewhere, and kept
 if it is greater.
 """
