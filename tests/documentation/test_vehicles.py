@@ -93,9 +93,9 @@ error of 5 % of 3 m made the greatest error 0.16 m instead of 0.05 m. A tracked 
 25 % is flown.
 
 While the vehicle flies with a slack cable, what the cable seems to pull is learned as an error of
-`VEH_QUAD_MASS` ([estimator.md](estimator.md#pull-and-drag)). `bebop` flew `hover` and `case-b` with errors of
--25 to 25 % of it with `lab` and `rtk`, and of -25 to 20 % with `gps`, eight flights each. The greatest error
-in `case-b` was, as a median in mm:
+`VEH_QUAD_MASS` ([estimator-derivation.md](estimator-derivation.md#pull-and-drag)). `bebop` flew `hover`
+and `case-b` with errors of -25 to 25 % of it with `lab` and `rtk`, and of -25 to 20 % with `gps`, eight
+flights each. The greatest error in `case-b` was, as a median in mm:
 
 | error of `VEH_QUAD_MASS` | -25 % | -20 % | -15 % | -10 % | -5 % | 0 | 5 % | 10 % | 15 % | 20 % | 25 % |
 |---|---|---|---|---|---|---|---|---|---|---|---|
