@@ -35,6 +35,8 @@ SWEEPS = {
     "delay-noise": f"case-b {BOTH} --seeds 3 {DELAY} {NOISE}",
     "latency-noise": f"case-b {BOTH} --seeds 3 --vary SIM_SENS_LAT_MS=0:80:9 {NOISE}",
     "delay-lag": f"case-b {BOTH} --seeds 3 {DELAY} --vary SIM_ROTOR_TAU_MS=0,10,20,30,40,60",
+    "long-delay": "case-b --seeds 10 --vary SIM_ACT_DELAY_MS=0:500:11",
+    "long-latency": "case-b --seeds 10 --vary SIM_SENS_LAT_MS=0:500:11",
     "delay-unknown": "case-b --seeds 10 --set VEH_ACT_DELAY=40 --vary SIM_ACT_DELAY_MS=0:96:25",
     "mass-length": "case-c --seeds 3 --vary SIM_LOAD_MASS=0.025:0.25:10 --vary SIM_CABLE_LEN=0.6:0.8:9",
     "wind-gusts": "case-b --seeds 3 --vary SIM_WIND_E=0:10:11 --vary SIM_GUST_STD=0,0.5,1,2,3",

@@ -23,7 +23,7 @@ from autopilot.control.actuators import lag_compensation as rotor_lag
 from autopilot.control.actuators import predictor as prediction
 from autopilot.control.actuators import rotor_model as actuation
 from autopilot.control.actuators import torque_observer
-from autopilot.control.actuators.rotor_model import actuation_constants
+from autopilot.control.actuators.rotor_model import Actuation, actuation_constants
 from autopilot.control.believed import believed_design, believed_vehicle
 from autopilot.control.design import gains_of
 from autopilot.control.drag import Drag, drag_force
@@ -803,7 +803,7 @@ def what_is_predicted_comes(law: SimpleNamespace, model: SimpleNamespace, vehicl
     constants = law.actuation_constants(delay, PREDICTED_LAG_S, TICK)
     for seed in range(2):
         rng = np.random.default_rng([36, seed])
-        belief = actuation.steady_actuation(5.0)
+        belief = actuation.steady_actuation(5.0, law.queue_rows(constants))
         rows = []
         for _ in range(12):
             u = np.array([5.0, 0.0, 0.0, 0.0]) + rng.normal(size=4) * [0.8, 0.02, 0.02, 0.02]
@@ -1238,8 +1238,10 @@ def test_compiled_and_plain_agree_to_the_bit(
     plain, fast = plain_laws(own_sources), compiled()
     constants, observing = actuation_constants(0.010, 0.02, TICK), observing_all(bebop)
     rng = np.random.default_rng(27)
+    rows = actuation.queue_rows(constants)
     memories = [
-        (law.start(), actuation.steady_actuation(4.9), law.nominal_on_ground(bebop)) for law in (plain, fast)
+        (law.start(), actuation.steady_actuation(4.9, rows), law.nominal_on_ground(bebop))
+        for law in (plain, fast)
     ]
     for _ in range(10):
         at, f, _ = random_path(rng, model, bebop)
@@ -1301,6 +1303,11 @@ def built(**values: float) -> PlumblineLaw:
     return law
 
 
+def hovering_actuation(law: PlumblineLaw, thrust: float) -> Actuation:
+    """The rotors of a vehicle that the law has let hover."""
+    return actuation.steady_actuation(thrust, actuation.queue_rows(law.constants.actuation))
+
+
 def parameters(**values: float) -> ParameterTable:
     table = autopilot_parameters(load_vehicle("bebop"))
     table.set("CTL_LAW", float(LAWS.index("plumbline")))
@@ -1347,7 +1354,7 @@ def test_load_and_cable_are_followed_more_slowly_while_the_rotors_cannot_give_th
     observed = observer.nominal_on_ground(law.constants.vehicle)._replace(
         ground_force=0.0, load_ground_height=-1.0
     )
-    hovering = actuation.steady_actuation(4.905)
+    hovering = hovering_actuation(law, 4.905)
     given = hovering.queue.copy()
     given[0, 1:3] = 0.2, -0.1  # N m, the rotors' moment about the level axes
     memory = law_file.start(law, state, ZERO, ZERO)
@@ -1378,7 +1385,7 @@ def test_every_mode_flies_through_one_interface(model: SimpleNamespace) -> None:
     law, state = built(VEH_ACT_DELAY=10.0), level_state(model)
     flown, vehicle = kernels_of(law), law.constants.vehicle
     cable = Cable(vehicle.cable_length)
-    hovering = actuation.steady_actuation(4.905)
+    hovering = hovering_actuation(law, 4.905)
     observed = observer.nominal_on_ground(vehicle)._replace(ground_force=0.0, load_ground_height=-1.0)
     memory = flown.start(law, state, ZERO, ZERO)
     still, above = Reference((ZERO,) * 7, EAST), Reference((state.x_quad, *(ZERO,) * 6), EAST)
@@ -1388,7 +1395,7 @@ def test_every_mode_flies_through_one_interface(model: SimpleNamespace) -> None:
     )
     memory, three = flown.quad_attitude(law, memory, state, state.R, 4.905, hovering, observed, cable)
     memory, four = flown.quad_position(
-        law, memory, state, above, actuation.steady_actuation(3.924), observed, cable
+        law, memory, state, above, hovering_actuation(law, 3.924), observed, cable
     )
     assert [c.thrust for c in (one, two, three, four)] == pytest.approx([4.905] * 3 + [3.924])
     for command in (one, two, three, four):
@@ -1465,7 +1472,7 @@ def test_a_vehicle_that_the_ground_holds_is_not_turned(bebop: Vehicle) -> None:
     )
     memory = law_file.start(law, state, state.x_quad, ZERO)
     jet = (state.x_quad, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO)
-    belief = actuation.steady_actuation(4.0, actuation.queue_rows(law.constants.actuation))
+    belief = hovering_actuation(law, 4.0)
     asked = [
         law_file.quad_position(
             law, memory, state, Reference(jet, EAST), belief, observed, Cable(truth.cable_length)
@@ -1483,7 +1490,7 @@ def test_cases_are_flown_within_true_limits(mission: str, delay_ticks: int, bebo
     signals = next(s for s in load_mission(mission).steps if isinstance(s, Signals))
     rows = signal_table(signals.terms)
     state, constants, observing = aloft(truth), law.constants, observing_all(bebop)
-    belief, observed = actuation.steady_actuation(4.905), observer.nominal_in_flight(bebop)
+    belief, observed = hovering_actuation(law, 4.905), observer.nominal_in_flight(bebop)
     on_their_way, cable = [state.rotor_force] * delay_ticks, Cable(truth.cable_length)
     memory = law_file.start(law, sensed(state), state.x_load, ZERO)
     worst = 0.0

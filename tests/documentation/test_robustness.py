@@ -30,6 +30,7 @@ PHASES = {
     "lift": "while the load is lifted",
     "mission": "in the mission",
     "lower": "while the load is set down",
+    "set_down": "as the vehicle touches the ground beside its load",
 }
 
 
@@ -100,6 +101,33 @@ def latency_noise() -> str:
     return f"""The latency is added to every sensor, including the inertial unit, and the autopilot knows it. The limit of `thesis`, which
 predicts nothing, is {ends(thesis, LATENCY, "ms")}. `plumbline` flies {home(ours)}; its error grows with noise times latency,
 {mm(error(of("latency-noise", **{LATENCY: 80.0, NOISE: 1.0})))} at 80 ms with the lab's noise.
+"""
+
+
+def long_delays() -> str:
+    sweeps = {"delay": ("long-delay", DELAY), "latency": ("long-latency", LATENCY)}
+    cells = {
+        word: sorted(of(sweep), key=lambda cell, name=name: cell[name])
+        for word, (sweep, name) in sweeps.items()
+    }
+    rows = [
+        f"| {one[DELAY]:g} ms | {one['completed']} | {mm(error([one]))} | {other['completed']} | {mm(error([other]))} |"
+        for one, other in zip(cells["delay"], cells["latency"], strict=True)
+    ]
+    lost = [cell for found in cells.values() for cell in found if cell["lost"]]
+    first = {
+        word: min((cell[sweeps[word][1]] for cell in found if not whole(cell)), default=None)
+        for word, found in cells.items()
+    }
+    told = [f"from {value:g} ms of {word} on" for word, value in first.items() if value is not None]
+    end = (
+        f"Flights are lost {' and '.join(told)}, all of them {lost_most(lost)}." if lost else "None is lost."
+    )
+    return f"""| of 10 flights | delay: completed | median error | latency: completed | median error |
+|---|---|---|---|---|
+{chr(10).join(rows)}
+
+{end}
 """
 
 
@@ -184,6 +212,7 @@ designed to tolerate 12 ms of unknown delay.
 MADE = {
     "delay-noise": delay_noise,
     "latency-noise": latency_noise,
+    "long-delays": long_delays,
     "delay-lag": delay_lag,
     "dropouts": dropouts,
     "wind-gusts": wind_gusts,

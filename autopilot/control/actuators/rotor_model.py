@@ -26,10 +26,6 @@ from numpy.typing import NDArray
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import ZERO, Vec3
 
-MAX_DELAY = 0.3  # s
-MAX_RATE_HZ = 1000.0  # Hz
-ROWS = round(MAX_DELAY * MAX_RATE_HZ) + 2
-
 Queue = NDArray[np.float64]
 
 
@@ -80,8 +76,8 @@ def queue_rows(constants: ActuationConstants) -> int:
     return constants.whole_periods + 2
 
 
-def steady_actuation(thrust: float, rows: int = ROWS) -> Actuation:
-    """Rotors that have been commanded this thrust (N) for a long time."""
+def steady_actuation(thrust: float, rows: int) -> Actuation:
+    """Rotors that have been commanded this thrust (N) for a long time; `rows` is from `queue_rows`."""
     queue = np.zeros((rows, 4))
     queue[:, 0] = thrust
     return Actuation(queue, thrust, ZERO)
