@@ -102,6 +102,7 @@ def believed_observer(table: ParameterTable, vehicle: Vehicle) -> ObserverConsta
         table["PLB_T_TORQUE"],
         MAX_PUSH_SHARE * weight,
         1.0 / table["CTL_RATE_HZ"],
+        believed_delay(table),
         believed_drag(table),
         vehicle,
     )

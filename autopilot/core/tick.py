@@ -431,6 +431,7 @@ def control_tick(rows: CoreRows, law_rows: Any, now_us: int) -> None:
         reset = nominal_on_ground(vehicle)
         reset = with_field(reset, "ground_force", observed.ground_force)
         reset = with_field(reset, "vehicle_ground_height", observed.vehicle_ground_height)
+        reset = with_field(reset, "stands", observed.stands)
         observed = with_field(reset, "load_ground_height", observed.load_ground_height)
     else:
         if constants.yaw_free:

@@ -244,7 +244,7 @@ class Episodes:
         weight = self.scenario.task.action.weight
         core.rows.commands[:, 0] = weight
         pack(
-            control._replace(thrust=weight, observed=control.observed._replace(ground_force=0.0)),
+            control._replace(thrust=weight, observed=control.observed._replace(ground_force=0.0, stands=0.0)),
             core.rows.control,
             0,
         )

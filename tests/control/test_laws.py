@@ -288,6 +288,7 @@ def fingerprints() -> dict[str, str]:
                     float(rng.choice([0.0, 3.0])),
                     float(rng.choice([-9.0, 9.0])),
                     0.0,
+                    float(rng.choice([0.0, 1.0])),
                     triple(0.2 * rng.normal(size=3)),
                     ZERO,
                     Drag(*(0.1 * rng.random(2))),

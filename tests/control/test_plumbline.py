@@ -23,6 +23,7 @@ from autopilot.control.actuators import lag_compensation as rotor_lag
 from autopilot.control.actuators import predictor as prediction
 from autopilot.control.actuators import rotor_model as actuation
 from autopilot.control.actuators import torque_observer
+from autopilot.control.actuators.disturbance_observer import DisturbanceEstimate
 from autopilot.control.actuators.rotor_model import Actuation, actuation_constants
 from autopilot.control.believed import believed_design, believed_vehicle
 from autopilot.control.design import gains_of
@@ -118,7 +119,7 @@ def compiled() -> SimpleNamespace:
 
 
 def observing_all(vehicle: Vehicle) -> observer.ObserverConstants:
-    return observer.observer_constants(0.3, 0.1, 0.0, 0.3, 1.5, TICK, BEBOP_DRAG, vehicle)
+    return observer.observer_constants(0.3, 0.1, 0.0, 0.3, 1.5, TICK, 0.0, BEBOP_DRAG, vehicle)
 
 
 def polynomial(coefficients: Array, t: float) -> Jet:
@@ -867,7 +868,7 @@ def a_mass_that_is_not_assumed_is_a_push_or_a_load(
     blown = law.nominal_in_flight(vehicle)._replace(push=(1.0, 2.0, 3.0))
     agree(law.with_extra_weight(blown, 0.1, vehicle).push, (1.0, 2.0, 3.0 - 0.1 * vehicle.gravity), 1e-12)
     assert law.with_extra_weight(blown, 0.0, vehicle) == blown
-    constants = law.observer_constants(0.3, 0.1, 0.0, 0.0, 2.0, TICK, BEBOP_DRAG, vehicle)
+    constants = law.observer_constants(0.3, 0.1, 0.0, 0.0, 2.0, TICK, 0.0, BEBOP_DRAG, vehicle)
     level, over = model.mat(np.eye(3)), (0.0, 0.0, vehicle.cable_length)
     hanging = State(ZERO, ZERO, (0.0, 0.0, -1.0), ZERO, over, ZERO, level, ZERO, ZERO)
     for extra_kg in (-0.05, 0.08):
@@ -891,7 +892,7 @@ def drag_is_found(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle
     lift = (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity
 
     def learned(believed: Drag, true: Drag, way: Callable[[int], Any]) -> tuple[Any, Any]:
-        constants = law.observer_constants(0.3, 0.02, 0.2, 0.0, 2.0, TICK, believed, vehicle)
+        constants = law.observer_constants(0.3, 0.02, 0.2, 0.0, 2.0, TICK, 0.0, believed, vehicle)
         observed = law.nominal_in_flight(vehicle)
         for k in range(300):
             v = model.vec(way(k))
@@ -916,7 +917,7 @@ def drag_is_found(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle
     slow, _ = learned(BEBOP_DRAG, thrice, lambda k: [0.2 if k % 2 else -0.2, 0.0, 0.0])
     agree(slow.drag, BEBOP_DRAG, 0.05 * BEBOP_DRAG.linear)
     # a wind that blows from the first tick on is no drag, long before its mean is known
-    constants = law.observer_constants(0.3, 0.02, 4.0, 0.0, 2.0, TICK, BEBOP_DRAG, vehicle)
+    constants = law.observer_constants(0.3, 0.02, 4.0, 0.0, 2.0, TICK, 0.0, BEBOP_DRAG, vehicle)
     observed = law.nominal_in_flight(vehicle)
     for k in range(100):
         v = (0.02 * k, 0.0, 0.0)
@@ -931,7 +932,7 @@ def drag_is_found(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle
 
 def gusts_outweigh_noise(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
     """The noisier the accelerometer, the more slowly the push is learned; less so in wind."""
-    constants = law.observer_constants(0.3, 0.1, 0.2, 0.1, 2.0, TICK, BEBOP_DRAG, vehicle)
+    constants = law.observer_constants(0.3, 0.1, 0.2, 0.1, 2.0, TICK, 0.0, BEBOP_DRAG, vehicle)
     still = law.nominal_in_flight(vehicle)
     breeze = 0.03 * (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity
     for push in (0.0, breeze, 0.9 * breeze, breeze + 0.5):
@@ -965,7 +966,7 @@ def sudden_gusts_are_followed(law: SimpleNamespace, model: SimpleNamespace, vehi
     lift = (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity
     still = law.nominal_in_flight(vehicle)
     slowed = law.slowed_by_noise(
-        law.observer_constants(0.3, 0.1, 0.0, 0.0, 9.0, TICK, Drag(0.0, 0.0), vehicle), still, 0.4 * 0.4
+        law.observer_constants(0.3, 0.1, 0.0, 0.0, 9.0, TICK, 0.0, Drag(0.0, 0.0), vehicle), still, 0.4 * 0.4
     )
     share = TICK / 0.1
     ticks = 100
@@ -1014,7 +1015,7 @@ def turned_to_and_fro(vehicle: Vehicle) -> list[tuple[tuple[tuple[State, Vec3], 
 def torque_is_found(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
     """The torque on a vehicle that moves to and fro, leans and turns, with rotor discs that tilt and a cable
     off its centre."""
-    constants = law.observer_constants(0.3, 0.1, 1.0, 0.1, 2.0, TICK, BEBOP_DRAG, vehicle)
+    constants = law.observer_constants(0.3, 0.1, 1.0, 0.1, 2.0, TICK, 0.0, BEBOP_DRAG, vehicle)
     beside, tilt = np.array(TORQUE_BESIDE), TORQUE_TILT
     lift = (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity
 
@@ -1034,7 +1035,7 @@ def torque_is_found(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehic
     agree(np.array(slow.torque.total) - slow.torque.steady, 0.5 * tilt * slowly_swept, 0.1 * tilt * 0.2)
     # one that is there from the first tick on does not follow the motion, long before its mean is known
     young = law.nominal_in_flight(vehicle)
-    gradual = law.observer_constants(0.3, 0.1, 4.0, 0.1, 2.0, TICK, BEBOP_DRAG, vehicle)
+    gradual = law.observer_constants(0.3, 0.1, 4.0, 0.1, 2.0, TICK, 0.0, BEBOP_DRAG, vehicle)
     for k in range(100):
         moving = upright((0.02 * k, 0.0, 0.0), vehicle)
         young = law.observe(young, moving, 1.0, lift, (-0.01, 0.02, 0.0), gradual, BEBOP_DRAG, vehicle, 0.5)
@@ -1067,7 +1068,7 @@ def torque_is_found(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehic
     assert stands.torque == kept._replace(total=ZERO)
     assert stands.vehicle_ground_height == height
     # an observer that is configured not to learn does not
-    deaf = law.observer_constants(0.3, 0.1, 1.0, 0.0, 2.0, TICK, BEBOP_DRAG, vehicle)
+    deaf = law.observer_constants(0.3, 0.1, 1.0, 0.0, 2.0, TICK, 0.0, BEBOP_DRAG, vehicle)
     for _ in range(100):
         unmoved = law.observe(
             law.nominal_in_flight(vehicle), state, 1.0, lift, (0.1, 0.1, 0.1), deaf, BEBOP_DRAG, vehicle, 0.5
@@ -1097,12 +1098,12 @@ def mass_and_wind_are_found(law: SimpleNamespace, model: SimpleNamespace, vehicl
     """With a swinging load half as heavy again as assumed, under the assumed drag and a level wind that
     pushes the rotors, in their plane, the frame, or both; the vehicle leans in every direction in turn."""
     heavy = vehicle._replace(load_mass=1.5 * vehicle.load_mass)
-    constants = law.observer_constants(0.3, 0.1, 0.0, 0.0, 2.0, TICK, BEBOP_DRAG, vehicle)
-    assert law.vehicle_on_ground(law.nominal_on_ground(vehicle), vehicle)
+    constants = law.observer_constants(0.3, 0.1, 0.0, 0.0, 2.0, TICK, 0.0, BEBOP_DRAG, vehicle)
+    assert law.vehicle_on_ground(law.nominal_on_ground(vehicle))
     wind = WIND_PUSH
     for frame_share in (0.0, 0.4, 1.0):
         observed = law.nominal_in_flight(vehicle)
-        assert not law.vehicle_on_ground(observed, vehicle)
+        assert not law.vehicle_on_ground(observed)
         for unpushed, f, push in blown_in_many_attitudes(vehicle, frame_share):
             air = law.drag_force(unpushed.v_quad, BEBOP_DRAG)
             motion = law.load_motion(unpushed, f, 0.0, add(push, air), heavy)
@@ -1125,7 +1126,7 @@ def mass_and_wind_are_found(law: SimpleNamespace, model: SimpleNamespace, vehicl
     for _ in range(50):
         observed = law.observe(observed, rest, 0.0, 1.0, ZERO, constants, BEBOP_DRAG, vehicle, 0.5)
     assert observed.ground_force == pytest.approx(vehicle.quad_mass * vehicle.gravity - 1.0, rel=1e-3)
-    assert law.vehicle_on_ground(observed, vehicle)
+    assert law.vehicle_on_ground(observed)
     assert observed.load_ground_height == state.x_load[2]
     # one that leans is carried by a gust
     for lean, stands in ((math.radians(9.0), True), (math.radians(11.0), False)):
@@ -1133,12 +1134,36 @@ def mass_and_wind_are_found(law: SimpleNamespace, model: SimpleNamespace, vehicl
         for _ in range(50):
             leaning = rest._replace(R=model.rodrigues([0.0, lean, 0.0]))
             carried = law.observe(carried, leaning, 0.0, 1.0, ZERO, constants, BEBOP_DRAG, vehicle, 0.5)
-        assert law.vehicle_on_ground(carried, vehicle) == stands
+        assert law.vehicle_on_ground(carried) == stands
     storm = law.nominal_on_ground(vehicle)._replace(ground_force=-9.0)
     blown = rest._replace(a_quad=(30.0, 0.0, 0.0))
     for _ in range(50):
         storm = law.observe(storm, blown, 0.0, 3.924, ZERO, constants, BEBOP_DRAG, vehicle, 0.5)
     agree(storm.push, np.array([2.0, 0.0, 0.0]), ROUNDING)
+
+
+def with_a_long_delay_it_stands_until_it_has_risen(
+    law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle
+) -> None:
+    """A vehicle that has touched down, and whose rotors carry nine tenths of its weight."""
+    light, in_air = 0.9 * vehicle.quad_mass * vehicle.gravity, law.nominal_in_flight(vehicle)
+    rest = level_state(model)._replace(x_quad=(0.0, 0.0, 0.7))
+    near, risen = ((0.0, 0.0, 0.7 + height) for height in (0.02, 0.04))
+    for delay, stands in ((0.05, False), (0.15, True)):
+        constants = law.observer_constants(0.3, 0.1, 0.0, 0.0, 2.0, TICK, delay, BEBOP_DRAG, vehicle)
+
+        def after(begin: DisturbanceEstimate, thrust: float, at: Vec3, with_: Any = constants) -> Any:
+            for _ in range(50):
+                state = rest._replace(x_quad=at)
+                begin = law.observe(begin, state, 0.0, thrust, ZERO, with_, BEBOP_DRAG, vehicle, 0.5)
+            return begin
+
+        settling = after(after(in_air, 0.5 * light, rest.x_quad), light, rest.x_quad)
+        assert law.vehicle_on_ground(settling) == stands
+        assert law.vehicle_on_ground(after(settling, light, near)) == stands
+        assert not law.vehicle_on_ground(after(settling, light, risen))
+        assert not law.vehicle_on_ground(after(settling, light / 0.9, rest.x_quad))
+        assert not law.vehicle_on_ground(after(in_air, light, rest.x_quad))
 
 
 def a_pace_multiplies_the_bandwidths_of_load_and_cable(
@@ -1169,6 +1194,7 @@ def a_pace_multiplies_the_bandwidths_of_load_and_cable(
 
 
 PROOFS: tuple[Callable[..., None], ...] = (
+    with_a_long_delay_it_stands_until_it_has_risen,
     a_pace_multiplies_the_bandwidths_of_load_and_cable,
     attitude_and_thrust_do_not_move_the_direction_asked_for,
     drag_is_flown_against,
@@ -1352,7 +1378,7 @@ def test_load_and_cable_are_followed_more_slowly_while_the_rotors_cannot_give_th
     law, state = built(), level_state(model)
     cable, level = Cable(law.constants.vehicle.cable_length), Reference((ZERO,) * 7, EAST)
     observed = observer.nominal_on_ground(law.constants.vehicle)._replace(
-        ground_force=0.0, load_ground_height=-1.0
+        ground_force=0.0, stands=0.0, load_ground_height=-1.0
     )
     hovering = hovering_actuation(law, 4.905)
     given = hovering.queue.copy()
@@ -1386,7 +1412,9 @@ def test_every_mode_flies_through_one_interface(model: SimpleNamespace) -> None:
     flown, vehicle = kernels_of(law), law.constants.vehicle
     cable = Cable(vehicle.cable_length)
     hovering = hovering_actuation(law, 4.905)
-    observed = observer.nominal_on_ground(vehicle)._replace(ground_force=0.0, load_ground_height=-1.0)
+    observed = observer.nominal_on_ground(vehicle)._replace(
+        ground_force=0.0, stands=0.0, load_ground_height=-1.0
+    )
     memory = flown.start(law, state, ZERO, ZERO)
     still, above = Reference((ZERO,) * 7, EAST), Reference((state.x_quad, *(ZERO,) * 6), EAST)
     memory, one = flown.load_position(law, memory, state, still, hovering, observed, cable)

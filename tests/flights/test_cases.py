@@ -80,6 +80,13 @@ def test_long_delays_are_flown_that_the_autopilot_knows(name: str, late_ms: floa
     assert (found["load_error_max_m"] or 1.0) < error_m
 
 
+def test_a_vehicle_settles_on_the_ground_with_a_long_delay() -> None:
+    """Its rotors carry nearly all of its weight for half a second after it has touched down."""
+    late = {"SIM_ACT_DELAY_MS": 200.0}
+    for seed in (1, 3):
+        flown("hover", Conditions(vehicle="octorotor", sensors="lab", seed=seed, settings=late))
+
+
 def test_a_heavy_load_is_lifted_outdoors_by_a_vehicle_that_is_not_as_it_is_believed() -> None:
     """Its battery sags while the cable is still slack: the rotor forces are learned from the rotor speeds."""
     found = flown("case-b", Conditions(vehicle="heavy-real", sensors="field"))

@@ -64,8 +64,10 @@ from autopilot.geometry.s2 import force_along_cable
 # m: a load this much higher than where it lay is in the air; a vehicle this much higher than where it stood
 # touches the ground nowhere
 _OFF_GROUND, _VEHICLE_OFF_GROUND = 0.03, 0.3
-# share of the vehicle's weight that the ground carries while the vehicle counts as standing
-_ON_GROUND_SHARE = 0.2
+# share of the vehicle's weight that the ground carries when the vehicle begins to stand. With a delay beyond
+# _PROMPT_DELAY (s) it then stands until the ground carries less than the smaller share, or it has risen by
+# _OFF_GROUND: otherwise the law would answer to rotations that the ground prevents, and turn it over.
+_ON_GROUND_SHARE, _STANDING_SHARE, _PROMPT_DELAY = 0.2, 0.03, 0.1
 _CONTACT_TIME = 0.02  # s, time constant of the estimate of the ground's force
 # cosine of 10 deg: a vehicle that leans more does not stand; a gust may carry it as the ground does
 _STANDING_COSINE = 0.985
@@ -95,6 +97,7 @@ class ObserverConstants(NamedTuple):
     push: float
     drag: float
     contact: float
+    standing_share: float  # of the vehicle's weight: less from the ground, and it no longer stands
     air: float
     gust_noise: float  # m/s^2 / N: noise that the gusts of a wind outweigh, for each newton of its push
     push_noise: float  # N, push that may be nothing but noise
@@ -117,6 +120,7 @@ class DisturbanceEstimate(NamedTuple):
     ground_force: float  # N, upward force on the vehicle besides that of its rotors while the cable is slack
     load_ground_height: float  # m, height at which the load lay
     vehicle_ground_height: float  # m, height at which the vehicle stood
+    stands: float  # 1 while the ground holds the vehicle, else 0
     steady_push: Vec3  # N, the part of the push that does not follow the speed
     prompt_push: Vec3  # N, the same, learned as fast as configured
     drag: Drag  # learned drag, beyond the assumed drag
@@ -142,10 +146,12 @@ def observer_constants(
     torque_time: float,
     max_push: float,
     period: float,
+    delay: float,
     drag: Drag,
     vehicle: Vehicle,
 ) -> ObserverConstants:
-    """For averages that fade with these time constants (s); 0 learns nothing. `drag` is the assumed drag."""
+    """For averages that fade with these time constants (s); 0 learns nothing. `delay` (s) is the assumed one
+    of commands and estimate, `drag` the assumed drag."""
 
     def share(time: float) -> float:
         return averaging_share(period, time)
@@ -156,6 +162,7 @@ def observer_constants(
         share(push_time),
         share(drag_time),
         share(_CONTACT_TIME),
+        _STANDING_SHARE if delay > _PROMPT_DELAY else _ON_GROUND_SHARE,
         share(_AIR_TIME),
         GUST_RANDOM_WALK * push_time / (sqrt(period) * vehicle.quad_mass),
         _PUSH_NOISE_SHARE * (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity,
@@ -207,6 +214,7 @@ def nominal_on_ground(vehicle: Vehicle) -> DisturbanceEstimate:
         vehicle.quad_mass * g,
         0.0,
         0.0,
+        1.0,
         ZERO,
         ZERO,
         Drag(0.0, 0.0),
@@ -224,14 +232,14 @@ def nominal_on_ground(vehicle: Vehicle) -> DisturbanceEstimate:
 def nominal_in_flight(vehicle: Vehicle) -> DisturbanceEstimate:
     """As `nominal_on_ground`, but vehicle and load are off the ground, wherever they are."""
     return nominal_on_ground(vehicle)._replace(
-        ground_force=0.0, load_ground_height=-inf, vehicle_ground_height=-inf
+        ground_force=0.0, load_ground_height=-inf, vehicle_ground_height=-inf, stands=0.0
     )
 
 
 @kernel
-def vehicle_on_ground(observed: DisturbanceEstimate, vehicle: Vehicle) -> bool:
+def vehicle_on_ground(observed: DisturbanceEstimate) -> bool:
     """Whether the ground holds the vehicle."""
-    return observed.ground_force > _ON_GROUND_SHARE * vehicle.quad_mass * vehicle.gravity
+    return observed.stands > 0.0
 
 
 @kernel
@@ -339,10 +347,14 @@ def observe(
             max(constants.min_factor, drag_correlation / (drag_square + min_drag_force * min_drag_force)),
         )
         learned = Drag(factor * shape.linear, factor * shape.quadratic)
-    stands = ground_force > _ON_GROUND_SHARE * vehicle.quad_mass * vehicle.gravity
+    weight = vehicle.quad_mass * vehicle.gravity
+    stands = ground_force > _ON_GROUND_SHARE * weight
     vehicle_ground_height = observed.vehicle_ground_height
     if stands:
         vehicle_ground_height = state.x_quad[2]
+    elif observed.stands > 0.0:
+        is_low = state.x_quad[2] < vehicle_ground_height + _OFF_GROUND
+        stands = is_low and ground_force > constants.standing_share * weight
     in_air = state.x_quad[2] > vehicle_ground_height + _VEHICLE_OFF_GROUND
     if suspended or (in_air and not taut > 0.0):
         torque = observe_torque(observed.torque, state, moment, constants.torque, vehicle)
@@ -368,6 +380,7 @@ def observe(
         ground_force,
         load_ground_height,
         vehicle_ground_height,
+        1.0 if stands else 0.0,
         steady_push,
         prompt_push,
         learned,

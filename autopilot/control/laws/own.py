@@ -95,7 +95,7 @@ def _believed(law: OwnLaw, state: State, actuation: Actuation, observed: Disturb
         actuation.thrust,
         actuation.moment,
         load_on_ground(observed, state),
-        vehicle_on_ground(observed, vehicle),
+        vehicle_on_ground(observed),
     )
 
 

@@ -189,7 +189,7 @@ def state_at_effect(
     constants: PlumblineConstants,
 ) -> Prediction:
     """State and rotors at the instant at which the command of this tick takes effect."""
-    if vehicle_on_ground(observed, constants.vehicle):
+    if vehicle_on_ground(observed):
         return predict_on_ground(state, actuation, constants.actuation)
     drag, push = drag_and_push(state, taut, observed, constants)
     return predict(
@@ -213,7 +213,7 @@ def compensated_command(
     air. A vehicle that stands gets no moment: the ground holds its attitude, and a delayed reaction to it
     would only rock the vehicle.
     """
-    if vehicle_on_ground(observed, constants.vehicle):
+    if vehicle_on_ground(observed):
         return with_field(demand, "moment", ZERO)
     moment = sub(demand.moment, observed.torque.total)
     thrust, moment = compensate_lag(
