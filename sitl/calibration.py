@@ -5,9 +5,11 @@ from __future__ import annotations
 from math import isfinite, sqrt
 from typing import Any
 
+from autopilot.geometry.linear import ZERO
 from autopilot.vehicle.layout import Layout, Rotor
 from autopilot.wire.convert.geodesy import Home
 from sitl.plant.records import Truth
+from sitl.sensors.imu import with_errors
 from sitl.sensors.overrides import with_overrides
 from sitl.sensors.profile import Profile, Sampled
 from sitl.settings import SECOND_US, Settings
@@ -21,6 +23,7 @@ def calibration(
 ) -> dict[str, Any]:
     """The contents of sensors.json (docs/sensors.md), at the beginning of the flight."""
     tick_s = settings.tick_us / SECOND_US
+    places = {"imu": truth.imu_position, "gnss": truth.antenna_position}
     sensors: dict[str, dict[str, Any]] = {}
     tables = fitted_sensors(with_overrides(profile, settings.overrides))
     for row, (name, table) in enumerate(zip(SENSOR_NAMES, tables, strict=True)):
@@ -32,13 +35,16 @@ def calibration(
             "period_s": table.period_s(tick_s) if isinstance(table, Sampled) else tick_s,
             "latency_ms": int(rows.clock[row, LATENCY]) / 1000.0,
             "loss": float(delivery[LOSS]),
-            "lever_arm_m": [0.0, 0.0, 0.0],
+            "lever_arm_m": list(places.get(name, ZERO)),
         }
         if "time_offset_ms" in sensors[name]:
             sensors[name]["time_offset_ms"] = float(delivery[STAMP_OFFSET]) / 1000.0
     for kind, unit in (("accel", "m_s2"), ("gyro", "rad_s")):
         noise = sensors["imu"][f"{kind}_noise_{unit}"]
         sensors["imu"][f"{kind}_noise_density_{unit}_sqrt_hz"] = noise * sqrt(tick_s)
+    inertial = with_errors(profile.imu.config(tick_s, truth.gravity), truth.imu_position, settings.imu_axes)
+    for kind, axes in (("accel", inertial.accel_axes), ("gyro", inertial.gyro_axes)):
+        sensors["imu"][f"{kind}_axes"] = [list(row) for row in axes]
     if profile.magnetometer is not None:
         field = profile.magnetometer.config(tick_s).field
         sensors["magnetometer"]["field_east_north_up_gauss"] = list(field)

@@ -86,6 +86,7 @@ COLUMNS = (
     *("vehicle_quaternion_w", *_xyz("vehicle_quaternion"), *_xyz("vehicle_rate", "_rad_s")),
     *("cable_taut", "cable_slack_events", "vehicle_on_ground", "load_on_ground"),
     *(*_xyz("vehicle_acceleration", "_m_s2"), "cable_tension_n", "diverged", "cable_snap_speed_m_s"),
+    *_xyz("vehicle_angular_acceleration", "_rad_s2"),
     *(*_xyz("imu_accel_bias", "_m_s2"), *_xyz("imu_gyro_bias", "_rad_s")),
     *(*_xyz("mocap_offset", "_m"), *_xyz("mocap_wander", "_m")),
     *(*_xyz("load_tracker_offset", "_m"), *_xyz("load_tracker_wander", "_m")),

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from math import inf
+from math import inf, radians
 from typing import NamedTuple
 
 from autopilot.geometry.linear import Vec3
 from autopilot.wire.parameter_table import ParameterError, ParameterTable
+from sitl.sensors.imu import AxisErrors
 from sitl.sensors.overrides import Overrides, overrides_in
 
 SECOND_US = 1_000_000
@@ -34,6 +35,7 @@ class Settings(NamedTuple):
     sensors_work_at_us: float = inf  # from when on these work again
     stamp_offset_us: int = 0  # added to the time stamps of the readings of trackers, camera and receiver
     overrides: Overrides = ()
+    imu_axes: AxisErrors = AxisErrors()
 
     def rotor_shares(self, count: int) -> tuple[float, ...]:
         """The share of its command that each of `count` rotors gives once they fail."""
@@ -72,4 +74,22 @@ def settings_of(table: ParameterTable) -> Settings:
         rotors_fail_at_us=round(table["SIM_ENGINE_AT_S"] * SECOND_US),
         stamp_offset_us=round(table["SIM_SENS_OFS_MS"] * 1000.0),
         overrides=overrides_in(table.__getitem__),
+        imu_axes=_imu_axes(table),
+    )
+
+
+def _imu_axes(table: ParameterTable) -> AxisErrors:
+    def vector(name: str) -> Vec3:
+        return (table[f"{name}_X"], table[f"{name}_Y"], table[f"{name}_Z"])
+
+    def share(name: str) -> Vec3:
+        x, y, z = vector(name)
+        return (x / 100.0, y / 100.0, z / 100.0)
+
+    def angles(name: str) -> Vec3:
+        x, y, z = vector(name)
+        return (radians(x), radians(y), radians(z))
+
+    return AxisErrors(
+        share("SIM_ACC_SCALE"), angles("SIM_ACC_ALIGN"), share("SIM_GYR_SCALE"), angles("SIM_GYR_ALIGN")
     )

@@ -427,9 +427,13 @@ def model_of(truth: Truth, profile: Profile, settings: Settings, pulse_at_us: in
     """The model of a world under these settings."""
     profile = with_overrides(profile, settings.overrides)
     tick_s = settings.tick_us / SECOND_US
-    values: list[Any] = [truth, profile.imu.config(tick_s, truth.gravity)]
+    inertial = profile.imu.config(tick_s, truth.gravity)
+    values: list[Any] = [truth, imu.with_errors(inertial, truth.imu_position, settings.imu_axes)]
     for table, blank in zip(fitted_sensors(profile)[1:], _NOT_FITTED, strict=True):
-        values.append(blank if table is None else table.config(tick_s))  # type: ignore[attr-defined]
+        config = blank if table is None else table.config(tick_s)  # type: ignore[attr-defined]
+        if isinstance(config, gnss.GnssConfig):
+            config = config._replace(antenna=truth.antenna_position)
+        values.append(config)
     values += [
         profile.imu.vibration(tick_s),
         0.0 if profile.magnetometer is None else profile.magnetometer.motor_field_gauss,

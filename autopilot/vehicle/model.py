@@ -137,6 +137,18 @@ class Vehicle(BaseModel):
         description="where the cable is attached: forward, left and upward of the centre of mass",
         json_schema_extra={"unit": "m"},
     )
+    imu_position_m: tuple[Offset, Offset, Offset] = Field(
+        (0.0, 0.0, 0.0),
+        strict=False,
+        description="where the inertial unit sits, as `attachment_m`",
+        json_schema_extra={"unit": "m"},
+    )
+    antenna_position_m: tuple[Offset, Offset, Offset] = Field(
+        (0.0, 0.0, 0.0),
+        strict=False,
+        description="where the antenna of the satellite receiver sits, as `attachment_m`",
+        json_schema_extra={"unit": "m"},
+    )
     inertia_kg_m2: Moments = Field(
         strict=False,  # TOML has lists, not tuples
         description="moments of inertia about the forward, left and upward axis",

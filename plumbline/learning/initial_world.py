@@ -92,4 +92,5 @@ def _suspended(truth: Truth) -> PlantState:
         tension=truth.load_mass * truth.gravity,
         diverged=0.0,
         snap_speed=0.0,
+        omega_dot_body=ZERO,
     )

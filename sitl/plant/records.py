@@ -91,6 +91,8 @@ class Truth(NamedTuple):
     friction: float  # Coulomb coefficient
     slip_rate: float  # 1/s, rate at which friction below the Coulomb limit brakes a slide
     attachment: Vec3 = ZERO  # m, of the cable, from the centre of mass, body
+    imu_position: Vec3 = ZERO  # m, of the inertial unit, from the centre of mass, body
+    antenna_position: Vec3 = ZERO  # m, of the receiver's antenna
     air: Air = Air()
     drive: Drive = Drive()
     supply: float = 1.0  # voltage of the battery, relative to that of a full one without current
@@ -125,6 +127,7 @@ class PlantState(NamedTuple):
     tension: float  # N, 0 while slack
     diverged: float  # 1.0: left the domain of the model; the state is held as it was before
     snap_speed: float  # m/s, greatest with which the cable came taut in the last step; 0: it did not
+    omega_dot_body: Vec3  # rad/s^2, at the end of the last step, as `accel_quad`
 
 
 class Motion(NamedTuple):

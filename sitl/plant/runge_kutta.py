@@ -26,6 +26,7 @@ class StepEnd(NamedTuple):
     accel_quad: Vec3
     quad_normal: float
     load_normal: float
+    omega_dot: Vec3
 
 
 @kernel
@@ -91,4 +92,5 @@ def runge_kutta_step(
         rates_now.accel_quad,
         rates_now.quad_normal,
         rates_now.load_normal,
+        rates_now.motion.omega,
     )

@@ -113,6 +113,7 @@ def frozen_state(state: PlantState) -> PlantState:
         state.tension,
         1.0,
         0.0,
+        state.omega_dot_body,
     )
 
 
@@ -162,6 +163,7 @@ def state_of(
         end.tension,
         0.0,
         snap_speed,
+        end.omega_dot,
     )
 
 
@@ -290,4 +292,5 @@ def initial_state(truth: Truth) -> PlantState:
         tension=0.0,
         diverged=0.0,
         snap_speed=0.0,
+        omega_dot_body=ZERO,
     )

@@ -13,9 +13,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.linear import Vec3, add, add3, scale, times
+from autopilot.geometry.linear import ZERO, Vec3, add, add3, scale, times
 from sitl.plant.records import PlantState
 from sitl.sensors.elementary import logarithm
+from sitl.sensors.lever_arm import has_lever_arm, position_of, velocity_of
 from sitl.sensors.noise import Drift, Noise, drift_start, drift_step, gaussian, uniform
 
 FIXED, FLOATING, LOST = 0.0, 1.0, 2.0  # GnssReading.quality
@@ -40,6 +41,7 @@ class GnssConfig(NamedTuple):
     lost_chance: float
     lost_s: float
     period_s: float
+    antenna: Vec3 = ZERO  # m, from the centre of mass, body
 
 
 class GnssState(NamedTuple):
@@ -92,10 +94,14 @@ def _remaining(config: GnssConfig, state: GnssState, noise: Noise) -> tuple[floa
 def sample(
     truth_state: PlantState, sensor_state: GnssState, config: GnssConfig, noise: Noise
 ) -> tuple[GnssReading, GnssState]:
-    """Position and velocity of the antenna, at the centre of mass."""
+    """Position and velocity of the antenna."""
+    x_antenna, v_antenna = truth_state.x_quad, truth_state.v_quad
+    if has_lever_arm(config.antenna):
+        x_antenna = position_of(truth_state, config.antenna)
+        v_antenna = velocity_of(truth_state, config.antenna)
     slow = times(config.position_error, sensor_state.error)
-    position = add3(truth_state.x_quad, slow, times(config.position_noise, gaussian(noise, 0)))
-    velocity = add(truth_state.v_quad, times(config.velocity_noise, gaussian(noise, 1)))
+    position = add3(x_antenna, slow, times(config.position_noise, gaussian(noise, 0)))
+    velocity = add(v_antenna, times(config.velocity_noise, gaussian(noise, 1)))
     multipath, floating = sensor_state.multipath, sensor_state.floating
     lost_remaining_s, float_remaining_s, quality = (
         sensor_state.lost_remaining_s,

@@ -10,7 +10,7 @@ from sitl.plant.records import ChainModel, Drive, Truth
 from sitl.vehicles.sim_parameter_file import FILE, sim_document
 from sitl.vehicles.truth import CHAIN_KEYS
 
-_ATTACHMENT = ("attachment_x", "attachment_y", "attachment_z")
+_PLACES = ("attachment", "imu_position", "antenna_position")  # fields of `Truth` that are positions
 
 
 @cache
@@ -27,7 +27,11 @@ def sim_parameters(truth: Truth) -> ParameterTable:
         "cable_length_m": truth.cable_length,
         "rotor_tau_ms": truth.rotor_tau * 1e3,
         **{CHAIN_KEYS[field]: value for field, value in truth.chain._asdict().items()},
-        **dict(zip(_ATTACHMENT, truth.attachment, strict=True)),
+        **{
+            f"{field}_{axis}": value
+            for field in _PLACES
+            for axis, value in zip("xyz", getattr(truth, field), strict=True)
+        },
         **truth.air._asdict(),
         **truth.drive._asdict(),
         "cable_diameter_mm": truth.air.cable_diameter * 1e3,
@@ -74,6 +78,8 @@ def apply(truth: Truth, table: ParameterTable) -> Truth:
     )
     return truth._replace(
         attachment=(table["SIM_ATT_X"], table["SIM_ATT_Y"], table["SIM_ATT_Z"]),
+        imu_position=(table["SIM_IMU_POS_X"], table["SIM_IMU_POS_Y"], table["SIM_IMU_POS_Z"]),
+        antenna_position=(table["SIM_GPS_POS_X"], table["SIM_GPS_POS_Y"], table["SIM_GPS_POS_Z"]),
         air=air,
         drive=drive,
         quad_mass=table["SIM_QUAD_MASS"],

@@ -112,7 +112,7 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
     # its lines stand at the speed that the speed controllers report
     "sitl.sensors.vibration": ("autopilot.geometry", "autopilot.wire.convert", *PLANT, "sitl.sensors"),
     "sitl.vehicles": (*VEHICLE, "autopilot.wire", "sitl.plant.records"),
-    "sitl.settings": ("autopilot.geometry", "autopilot.wire", "sitl.sensors.overrides"),
+    "sitl.settings": ("autopilot.geometry", "autopilot.wire", "sitl.sensors.imu", "sitl.sensors.overrides"),
     "sitl.world": (
         "autopilot.geometry",
         "autopilot.vehicle.layout",

@@ -187,6 +187,7 @@ WRONG = [
     "unknown vehicle 'bepop'; did you mean bebop? shipped: bebop, bebop-real, heavy, heavy-real, "
     "hexarotor, iris, octorotor, thesis; or the path of a file",
 ]
+PLACES = ("attachment_m", "imu_position_m", "antenna_position_m")
 # keys whose range is more than two bounds
 RANGES = {
     "name": "text",
@@ -214,7 +215,7 @@ def row(key: str, field: FieldInfo) -> str:
     unit = (field.json_schema_extra or {}).get("unit", "")
     if key == "inertia_kg_m2":
         allowed = "three of " + two_bounds(FieldInfo.from_annotation(Moment))
-    elif key == "attachment_m":
+    elif key in PLACES:
         allowed = "three of " + two_bounds(FieldInfo.from_annotation(Offset))
     else:
         allowed = RANGES.get(key) or two_bounds(field)
@@ -222,7 +223,7 @@ def row(key: str, field: FieldInfo) -> str:
         default = f"{ARM_RATIOS[key]:g} `arm_m`"
     elif key == "name":
         default = "the file's"
-    elif key == "attachment_m":
+    elif key in PLACES:
         default = "the centre"
     elif isinstance(field.default, bool):
         default = f"`{str(field.default).lower()}`"

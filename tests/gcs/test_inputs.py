@@ -105,7 +105,7 @@ def test_unknown_vehicles_and_sensors_get_the_names_there_are():
     ("setting", "part"),
     [
         ("SIM_WINDE=3", "--set SIM_WINDE: no such parameter; did you mean SIM_WIND_E? docs/parameters.md "),
-        ("SIM_BRIGHT=3", "--set SIM_BRIGHT: no such parameter; there are SIM_ACC_NOISE, SIM_ACT_DELAY_MS, "),
+        ("SIM_BRIGHT=3", "--set SIM_BRIGHT: no such parameter; there are SIM_ACC_ALIGN_X, SIM_ACC_ALIGN_Y, "),
         ("NGC_KXX=3", "--set NGC_KXX: no such parameter; did you mean NGC_KX? docs/parameters.md lists all"),
         (
             "SIM_NOISE=1",

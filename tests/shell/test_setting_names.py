@@ -15,7 +15,7 @@ UNKNOWN = {
     "MPC_FOO": "there are MPC_MAN_Y_MAX, ",
     "SIM_WIND": "did you mean SIM_WIND_E, SIM_WIND_N or SIM_WIND_U?",
     "SIM_WINDE": "did you mean SIM_WIND_E?",
-    "SIM_FOO": "there are SIM_ACC_NOISE, ",
+    "SIM_FOO": "there are SIM_ACC_ALIGN_X, ",
     "WPNAV_SPEED": "did you mean WNC_SPEED or MIS_SPEED?",
     "FOO": "names begin with one of BAT_, COM_, ",
 }

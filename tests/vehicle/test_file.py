@@ -68,6 +68,7 @@ EFFECTS = {
     **{"battery": False, "battery_cells": 3, "battery_capacity_mah": 1200.0, "battery_charge": 1.0},
     **{"battery_resistance_ohm": 0.06, "battery_hover_w": 65.0},
 }
+CENTRED = {"imu_position_m": [0.0, 0.0, 0.0], "antenna_position_m": [0.0, 0.0, 0.0]}  # no file has others
 
 
 def shipped(name):
@@ -88,6 +89,7 @@ def test_a_shipped_file_states_every_key_and_is_read_as_written(name):
     assert {key: list(v) if isinstance(v, tuple) else v for key, v in read.items()} == {
         **{"rotors": 4, "frame": "plus", "spin": "", "rotor": [], "believed": "", "parameters": {}},
         **EFFECTS,
+        **CENTRED,
         "rotor_radius_m": ARM_RATIOS["rotor_radius_m"] * table["arm_m"],
         **CABLE_OF_LINKS,
         **table,
@@ -325,7 +327,8 @@ def test_what_the_file_may_say_both_programs_can_take(numbers, forces, inertia):
 
 def test_every_field_of_the_truth_is_the_key_that_begins_with_its_name():
     beside = ("name", "believed", "parameters", "rotors", "frame", "spin", "rotor", "inertia_kg_m2")
-    elsewhere = {"attachment_m", *AIR_KEYS.values(), *DRIVE_KEYS.values(), *CHAIN_KEYS.values()}
+    places = ("attachment_m", "imu_position_m", "antenna_position_m")
+    elsewhere = {*places, *AIR_KEYS.values(), *DRIVE_KEYS.values(), *CHAIN_KEYS.values()}
     keys = [key for key in Vehicle.model_fields if key not in beside and key not in elsewhere]
     numbers = {key: float(place) for place, key in enumerate(keys)}  # all different
     vehicle = load_vehicle("heavy").model_copy(update=numbers)

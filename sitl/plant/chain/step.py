@@ -15,7 +15,8 @@ from math import ceil, inf, sqrt
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Vec3, axpy, dot, norm, sub
 from autopilot.geometry.packed import pack, unpack
-from autopilot.geometry.so3 import Quat, quat_normalise
+from autopilot.geometry.so3 import Quat, quat_normalise, rotation_from_quat
+from sitl.plant.attachment import inverse_inertia_times, moment_arm
 from sitl.plant.chain.forces import Bodies
 from sitl.plant.chain.records import (
     STRETCH_BASE,
@@ -209,6 +210,7 @@ def advance_chain(
     taut_tension = TAUT_SHARE * truth.load_mass * truth.gravity
     taut, slack_events, snap_speed = state.taut, state.slack_events, 0.0
     accel_quad, tension, quad_normal, load_normal = state.accel_quad, state.tension, 0.0, 0.0
+    omega_dot = state.omega_dot_body
     remaining, longest = h, LONGEST_STEP
     while remaining > 0.0:
         t = step_length(rows, model, cable_length.length, remaining, longest)
@@ -231,6 +233,8 @@ def advance_chain(
             snap_speed = max(snap_speed, closing)
         q = vector(rows.link, 0)
         accel_quad = axpy(tension / (truth.quad_mass + half_share * cable_length.length), q, end.free.quad)
+        arm = moment_arm(q, rotation_from_quat(at.quat), truth)
+        omega_dot = axpy(tension, inverse_inertia_times(arm, truth), end.free.spin)
         quad_normal, load_normal = end.free.quad_normal, end.free.load_normal
         remaining -= t
     rows.held[1] = cable_length.length
@@ -244,7 +248,7 @@ def advance_chain(
     pack(LoadBody(at.load.quat, zero_tiny_components(at.load.omega)), rows.body, 0)
     for i in range(rows.v.shape[0]):
         put(rows.v, i, zero_tiny_components(vector(rows.v, i)))
-    end_of_step = StepEnd(motion, 0.0, tension, accel_quad, quad_normal, load_normal)
+    end_of_step = StepEnd(motion, 0.0, tension, accel_quad, quad_normal, load_normal, omega_dot)
     return state_of(end_of_step, state.q_cable, taut, slack_events, snap_speed, truth)
 
 

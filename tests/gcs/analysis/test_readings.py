@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from pyulog import ULog
+from scipy.spatial.transform import Rotation
 
 import plumbline
 from autopilot.geometry.frames import frd_from_flu, ned_from_enu, quat_ned_frd_from_enu_flu
@@ -197,6 +198,33 @@ def test_the_biases_are_those_that_the_readings_contain() -> None:
     )
     assert np.abs(bias).min() > 1e-5
     assert np.allclose(measured[1:], there[1:] + bias[:-1], rtol=0.0, atol=SINGLE)
+
+
+def test_the_calibration_tells_how_the_inertial_unit_measures_the_truth() -> None:
+    places = {"SIM_IMU_POS_X": 0.02, "SIM_IMU_POS_Z": 0.03, "SIM_GPS_POS_Z": 0.1}
+    misaligned = {"SIM_ACC_SCALE_Z": 1.0, "SIM_ACC_ALIGN_X": 0.5, "SIM_GYR_SCALE_Y": -1.0}
+    readings, _ = flown(Conditions(sensors="rtk", settings={"SIM_NOISE_SCALE": 0.0, **places, **misaligned}))
+    known = readings.calibration
+    unit, arm = known["sensors"]["imu"], np.array(known["sensors"]["imu"]["lever_arm_m"])
+    assert (arm.tolist(), known["sensors"]["gnss"]["lever_arm_m"]) == ([0.02, 0.0, 0.03], [0.0, 0.0, 0.1])
+    assert known["sensors"]["barometer"]["lever_arm_m"] == [0.0, 0.0, 0.0]
+    rate, change, accel, quat = (
+        columns(readings, "truth", *names)
+        for names in (
+            axes("vehicle_rate", "rad_s"),
+            axes("vehicle_angular_acceleration", "rad_s2"),
+            axes("vehicle_acceleration", "m_s2"),
+            [f"vehicle_quaternion_{part}" for part in "wxyz"],
+        )
+    )
+    attitude = Rotation.from_quat(quat, scalar_first=True)
+    force = attitude.inv().apply(accel + np.array([0.0, 0.0, known["gravity_m_s2"]]))
+    force += np.cross(change, arm) + np.cross(rate, np.cross(rate, arm))
+    for name, unit_name, true in (("accel", "m_s2", force), ("gyro", "rad_s", rate)):
+        expected = true @ np.array(unit[f"{name}_axes"]).T
+        measured = columns(readings, "imu", *axes(name, unit_name))
+        assert np.allclose(measured[1:], expected[1:], rtol=SINGLE, atol=SINGLE)
+        assert np.abs(true - expected).max() > 1e-3
 
 
 @pytest.mark.parametrize("sensors", ["lab", "rtk"])

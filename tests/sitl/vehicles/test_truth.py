@@ -101,6 +101,12 @@ EFFECTS = {
     "SIM_ATT_X": (0.01, lambda t: t.attachment[0]),
     "SIM_ATT_Y": (-0.02, lambda t: t.attachment[1]),
     "SIM_ATT_Z": (-0.03, lambda t: t.attachment[2]),
+    "SIM_IMU_POS_X": (0.04, lambda t: t.imu_position[0]),
+    "SIM_IMU_POS_Y": (-0.05, lambda t: t.imu_position[1]),
+    "SIM_IMU_POS_Z": (0.06, lambda t: t.imu_position[2]),
+    "SIM_GPS_POS_X": (-0.1, lambda t: t.antenna_position[0]),
+    "SIM_GPS_POS_Y": (0.2, lambda t: t.antenna_position[1]),
+    "SIM_GPS_POS_Z": (0.3, lambda t: t.antenna_position[2]),
     "SIM_THR_CURVE": (0.8, lambda t: t.drive.thrust_curve),
     "SIM_THR_KNOWN": (0.7, lambda t: t.drive.known_curve),
     "SIM_ESC_STEPS": (500.0, lambda t: t.drive.esc_steps),
@@ -134,8 +140,9 @@ def test_a_count_is_a_whole_number(bebop):
 
 @pytest.mark.parametrize("name", ["bebop-real", "heavy-real"])
 def test_parameters_start_from_what_a_real_vehicle_has(name):
-    """Except for the rounding of capacity and charge."""
+    """Except for the rounding of capacity and charge. Its sensors sit at the centre of mass."""
     truth = load_truth(name)
     table = sim_parameters(truth)
     assert all(table[effect] == pytest.approx(read(truth)) for effect, (_, read) in EFFECTS.items())
-    assert all(table[effect] != 0.0 for effect in EFFECTS if effect != "SIM_ESC_RPM_CTL")
+    absent = {"SIM_ESC_RPM_CTL", *(effect for effect in EFFECTS if "_POS_" in effect)}
+    assert all(table[effect] != 0.0 for effect in EFFECTS if effect not in absent)
