@@ -2,7 +2,7 @@
 
 | symbol | code name | frame | unit | |
 |---|---|---|---|---|
-| r | force | I | N | m_Q R (a - bias) - f R e_3: all that acts besides weight and thrust |
+| r | force | I | N | m_Q R (a - bias - a_t) - f R e_3: all that acts besides weight and thrust |
 | T q | pull | I | N | of the cable |
 | D | | I | N | drag of the frame, along the flow of the air past it |
 | H | | I | N | drag of the rotors, in their plane |
@@ -48,7 +48,7 @@ def force_beyond_thrust(
 ) -> Vec3:
     """r, N, world."""
     R = rotation_from_quat(vehicle.quat_wxyz)
-    specific_force = apply(R, sub(imu.accel, vehicle.accel_bias))
+    specific_force = apply(R, sub(sub(imu.accel, vehicle.accel_bias), vehicle.turning_accel))
     return axpy(-thrust, column(R, 2), scale(tuning.quad_mass, specific_force))
 
 

@@ -199,6 +199,7 @@ def vehicle_with_status(v: VehicleEstimate, age_s: float, rejected: float) -> Ve
         age_s,
         rejected,
         v.source,
+        v.turning_accel,
     )
 
 
@@ -288,6 +289,7 @@ def inject_error(state: EstimatorState, history: History) -> EstimatorState:
         v.age_s,
         v.rejected,
         v.source,
+        v.turning_accel,
     )
     sensor_errors = a
     if state.size >= AIDED_SIZE:

@@ -25,8 +25,8 @@ from autopilot.estimation.records import (
     History,
 )
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.linear import Vec3, cross
-from autopilot.geometry.so3 import Quat, quat_exp, quat_multiply
+from autopilot.geometry.linear import ZERO, Vec3, apply, cross, scale, sub
+from autopilot.geometry.so3 import Quat, quat_exp, quat_multiply, rotation_from_quat
 
 NEVER = -float("inf")
 
@@ -96,6 +96,22 @@ def interpolate4(ring: Array, row: int, share: float, first: int) -> Quat:
         rest * ring[row, first + 2] + share * ring[later, first + 2],
         rest * ring[row, first + 3] + share * ring[later, first + 3],
     )
+
+
+@kernel
+def turning_velocity(head: int, ring: Array, time_s: float, r: Vec3) -> Vec3:
+    """(R r)' of a vector that is fixed to the body: over the step between the rows about `time_s`; zero where
+    there is no such step yet."""
+    row, _ = row_before(head, ring, time_s)
+    if row == head:
+        row = (row - 1) % RING_LENGTH
+    later = (row + 1) % RING_LENGTH
+    dt = ring[later, 0] - ring[row, 0]
+    if not 0.0 < dt < -NEVER:
+        return ZERO
+    before, after = interpolate4(ring, row, 0.0, QUAT), interpolate4(ring, later, 0.0, QUAT)
+    change = sub(apply(rotation_from_quat(after), r), apply(rotation_from_quat(before), r))
+    return scale(1.0 / dt, change)
 
 
 @kernel

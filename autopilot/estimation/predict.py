@@ -56,7 +56,20 @@ from autopilot.estimation.tautness import (
 )
 from autopilot.estimation.vibration import accel_noise, gyro_noise, update_vibration
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.linear import Mat3, Vec3, add, apply, axpy, cross, dot, norm, scale, sub, times
+from autopilot.geometry.linear import (
+    ZERO,
+    Mat3,
+    Vec3,
+    add,
+    apply,
+    axpy,
+    cross,
+    dot,
+    norm,
+    scale,
+    sub,
+    times,
+)
 from autopilot.geometry.s2 import normalise, tangent
 from autopilot.geometry.so3 import quat_exp, quat_multiply, quat_normalise, rotation_from_quat
 
@@ -102,6 +115,15 @@ def filtered_body_rate(
 
 
 @kernel
+def turning_accel(rate: Vec3, change: Vec3, position: Vec3, dt: float) -> Vec3:
+    """What an accelerometer at a `position` (m, from the centre of mass, body) measures of a rotation by
+    `rate` (rad/s), which has changed by `change` in dt seconds: W' x r + W x (W x r), m/s^2, body."""
+    if not dt > 0.0 or (position[0] == 0.0 and position[1] == 0.0 and position[2] == 0.0):
+        return ZERO
+    return axpy(1.0 / dt, cross(change, position), cross(rate, cross(rate, position)))
+
+
+@kernel
 def predict_vehicle(
     vehicle: VehicleEstimate,
     imu: ImuReading,
@@ -113,7 +135,9 @@ def predict_vehicle(
 ) -> tuple[VehicleEstimate, Mat3]:
     """Strapdown integration by the trapezoidal rule over the last two samples; also R at half a step."""
     gyro = sub(_mean(imu.gyro, last.gyro), vehicle.gyro_bias)
-    accel = sub(_mean(imu.accel, last.accel), vehicle.accel_bias)
+    omega = filtered_body_rate(vehicle, imu.gyro, moment, gyro_var, tuning, dt)
+    turning = turning_accel(gyro, sub(omega, vehicle.omega_body), tuning.imu_position, dt)
+    accel = sub(sub(_mean(imu.accel, last.accel), vehicle.accel_bias), turning)
     R = rotation_from_quat(quat_multiply(vehicle.quat_wxyz, quat_exp(scale(0.5 * dt, gyro))))
     force = apply(R, accel)  # specific force, ENU
     accel_quad = (force[0], force[1], force[2] - tuning.gravity)
@@ -121,13 +145,14 @@ def predict_vehicle(
         axpy(0.5 * dt * dt, accel_quad, axpy(dt, vehicle.v_quad, vehicle.x_quad)),
         axpy(dt, accel_quad, vehicle.v_quad),
         quat_normalise(quat_multiply(vehicle.quat_wxyz, quat_exp(scale(dt, gyro)))),
-        filtered_body_rate(vehicle, imu.gyro, moment, gyro_var, tuning, dt),
+        omega,
         vehicle.gyro_bias,
         vehicle.accel_bias,
         accel_quad,
         vehicle.age_s + dt,
         vehicle.rejected,
         vehicle.source,
+        turning,
     )
     return predicted, R
 

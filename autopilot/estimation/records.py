@@ -162,6 +162,8 @@ class EstimatorTuning(NamedTuple):
     load_height: float  # m, height of the centre of the load on the ground
     initial_load_forward: float  # m ahead of the vehicle on the ground: where the load is at first
     initial_load_std: float  # m
+    imu_position: Vec3  # m, from the centre of mass, body
+    antenna_position: Vec3  # m, of the receiver
 
 
 class VehicleEstimate(NamedTuple):
@@ -177,6 +179,7 @@ class VehicleEstimate(NamedTuple):
     age_s: float  # of the last accepted pose or fix; infinite before the first
     rejected: float  # poses or fixes in a row that failed the gate
     source: float  # NO_SENSOR, TRACKER or RECEIVER
+    turning_accel: Vec3  # m/s^2, body: what an IMU beside the centre of mass measures of the rotation
 
 
 NOT_LAID = -1e6  # m, a height below all others
@@ -324,6 +327,7 @@ def blank_state() -> EstimatorState:
             age_s=inf,
             rejected=0.0,
             source=NO_SENSOR,
+            turning_accel=ZERO,
         ),
         load=LoadEstimate(
             x_load=ZERO,

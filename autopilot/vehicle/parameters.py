@@ -111,6 +111,10 @@ def _with_law(parameter: Parameter, law: str) -> Parameter:
     return replace(parameter, default=number, high=number, text=text)
 
 
+def _coordinates(name: str, place: tuple[float, float, float]) -> dict[str, float]:
+    return {f"{name}_{axis}_m": value for axis, value in zip("xyz", place, strict=True)}
+
+
 _MAX_TO_HOVER_FORCE = 1.598  # of a rotor of the vehicle of Table 4-1 with its load, rounded down
 
 
@@ -124,7 +128,6 @@ def vehicle_values(belief: Vehicle) -> dict[str, float]:
     if belief.limited:
         rotor_min, rotor_max = belief.rotor_min_n, belief.rotor_max_n
     j_xx, j_yy, j_zz = belief.inertia_kg_m2
-    attached_x, attached_y, attached_z = belief.attachment_m
     return {
         "quad_mass_kg": belief.quad_mass_kg,
         "load_mass_kg": belief.load_mass_kg,
@@ -139,9 +142,9 @@ def vehicle_values(belief: Vehicle) -> dict[str, float]:
         "torque_ratio_m": belief.torque_ratio_m,
         "rotor_tau_ms": 1e3 * belief.rotor_tau_s,
         "gravity_m_s2": belief.gravity_m_s2,
-        "attachment_x_m": attached_x,
-        "attachment_y_m": attached_y,
-        "attachment_z_m": attached_z,
+        **_coordinates("attachment", belief.attachment_m),
+        **_coordinates("imu_position", belief.imu_position_m),
+        **_coordinates("antenna_position", belief.antenna_position_m),
         "gear_height_m": belief.gear_height_m,
         "load_radius_m": belief.load_radius_m,
         "battery_cells": float(belief.battery_cells),

@@ -60,6 +60,7 @@ _BATTERY = (
     "SIM_BAT_CHARGE",
     "SIM_ESC_RPM_CTL",
 )
+_ANTENNA = tuple(f"{whose}_GPS_POS_{axis}" for whose in ("SIM", "VEH") for axis in "XYZ")
 _PULSE = ("SIM_GUST_E", "SIM_GUST_N", "SIM_GUST_U")
 _REQUIREMENTS = (
     _Requirement(
@@ -148,6 +149,8 @@ def _simulator_problem(name: str, given: Mapping[str, set[float]], simulator: Pa
 
 def _sensor_problem(name: str, fitted: set[str], sensors: str) -> str:
     tables = {table for key in OVERRIDDEN_KEYS.get(name, ()) for table in key.tables}
+    if name in _ANTENNA:
+        tables = {"gnss"}
     if not tables or not tables.isdisjoint((*fitted, "imu")):
         return ""
     missing = " and no ".join(text for table, text in _TABLES.items() if table in tables)

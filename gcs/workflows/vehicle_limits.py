@@ -47,8 +47,8 @@ def vehicle_as_set(belief: Vehicle, table: AutopilotParameters, settings: Settin
             changed[key] = table[name]
         elif name in _INERTIA:
             changed["inertia_kg_m2"] = tuple(table[axis] for axis in _INERTIA)
-        elif name in _ATTACHMENT:
-            changed["attachment_m"] = tuple(table[axis] for axis in _ATTACHMENT)
+        elif place := _PLACES.get(name[:-1]):
+            changed[place] = tuple(table[name[:-1] + axis] for axis in "XYZ")
         elif name == "VEH_ROTOR_TAU":
             changed["rotor_tau_s"] = 1e-3 * table[name]
         elif name == "VEH_ARM_LEN":  # the places of the rotors are in units of it
@@ -73,7 +73,11 @@ _NUMBERS = {
     "VEH_GRAVITY": "gravity_m_s2",
 }
 _INERTIA = ("VEH_J_XX", "VEH_J_YY", "VEH_J_ZZ")
-_ATTACHMENT = ("VEH_ATT_X", "VEH_ATT_Y", "VEH_ATT_Z")
+_PLACES = {
+    "VEH_ATT_": "attachment_m",
+    "VEH_IMU_POS_": "imu_position_m",
+    "VEH_GPS_POS_": "antenna_position_m",
+}
 _ROTOR_LIMITS = ("VEH_ROTOR_MIN", "VEH_ROTOR_MAX", "VEH_ROTOR_LIM")
 
 

@@ -54,6 +54,8 @@ OF_WORLD: dict[str, tuple[float, dict[str, float]]] = {
     "SIM_BLADE_STIFF": (1.0, {"SIM_ROTOR_FLAP": 0.01}),
     "SIM_GPS_MP_M": (0.1, {}),
     "SIM_MAG_MOT": (0.1, {}),
+    "SIM_GPS_POS_X": (0.1, {}),
+    "VEH_GPS_POS_Z": (0.1, {}),
 }
 
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 from math import sqrt
 
 from autopilot.estimation.correction import (
+    PastState,
     add_position_jacobian,
     add_velocity_jacobian,
     inject_error,
@@ -30,7 +31,7 @@ from autopilot.estimation.covariance import (
     within_gate,
     zero_covariance,
 )
-from autopilot.estimation.history import reset_past_states
+from autopilot.estimation.history import reset_past_states, turning_velocity
 from autopilot.estimation.measurements.magnetic import correct_magnetic, magnetic_north
 from autopilot.estimation.measurements.pose import set_initial_covariance
 from autopilot.estimation.measurements.zero_velocity import slides
@@ -62,7 +63,7 @@ from autopilot.estimation.records import (
 )
 from autopilot.estimation.tautness import tauten
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.linear import ZERO, Vec3, add, apply_transposed, cross, from_columns, norm, sub
+from autopilot.geometry.linear import ZERO, Vec3, add, apply, apply_transposed, cross, from_columns, norm, sub
 from autopilot.geometry.packed import with_field
 from autopilot.geometry.s2 import normalise, tangent
 from autopilot.geometry.so3 import quat_from_rotation, rotation_from_quat
@@ -246,7 +247,7 @@ def start_from_fix(
         P[ATTITUDE, ACCEL_BIAS + j], P[ACCEL_BIAS + j, ATTITUDE] = about_x, about_x
         P[ATTITUDE + 1, ACCEL_BIAS + j], P[ACCEL_BIAS + j, ATTITUDE + 1] = about_y, about_y
     state = restart_slow_error(state, history)
-    x_quad, v_quad = fix.position, fix.velocity
+    x_quad, v_quad = sub(fix.position, apply(R, tuning.antenna_position)), fix.velocity
     if not airborne:
         x_quad = (x_quad[0], x_quad[1], old.x_quad[2] if old.source == RECEIVER else tuning.gear_height)
         v_quad = (v_quad[0], v_quad[1], 0.0) if old.source == RECEIVER else ZERO
@@ -261,6 +262,7 @@ def start_from_fix(
         fix.age_s,
         0.0,
         RECEIVER,
+        old.turning_accel,
     )
     reset_past_states(history, X_QUAD, 3, (x_quad[0], x_quad[1], x_quad[2], 0.0))
     reset_past_states(history, V_QUAD, 3, (v_quad[0], v_quad[1], v_quad[2], 0.0))
@@ -292,6 +294,26 @@ def reset_position_uncertainty(state: EstimatorState, history: History) -> Estim
         P[VELOCITY + i, VELOCITY + i] += 1.0
     v = state.vehicle
     return with_vehicle(state, vehicle_with_status(v, v.age_s, 0.0), state.resets + 1.0)
+
+
+@kernel
+def past_antenna(
+    past: PastState, state: EstimatorState, history: History, tuning: EstimatorTuning
+) -> PastState:
+    """The past state with position and velocity of the antenna.
+
+    At r from the centre of mass they are x + R r and v + (R r)'. An error of the attitude adds attitude x R r
+    and attitude x (R r)' to theirs; that of the gyroscope's bias in (R r)' is left out.
+    """
+    r = tuning.antenna_position
+    if r[0] == 0.0 and r[1] == 0.0 and r[2] == 0.0:
+        return past
+    arm = apply(rotation_from_quat(past.quat_wxyz), r)
+    arm_velocity = turning_velocity(state.head, history.ring, state.time_s - past.age, r)
+    past = with_field(past, "x_quad", add(past.x_quad, arm))
+    past = with_field(past, "v_quad", add(past.v_quad, arm_velocity))
+    past = with_field(past, "displacement", add(past.displacement, arm))
+    return with_field(past, "velocity_gain", sub(past.velocity_gain, arm_velocity))
 
 
 @kernel
@@ -338,7 +360,7 @@ def correct_gnss(
         ):
             return state
         state = start_from_fix(state, history, fix, tuning, thrust)
-    past = past_state(state, history, tuning, fix.age_s)
+    past = past_antenna(past_state(state, history, tuning, fix.age_s), state, history, tuning)
     innovation = sub(fix.position, add(past.x_quad, state.sensor_errors.gnss))
     difference = sub(fix.velocity, past.v_quad)
     horizontal_std, vertical_std = new_share * fix.horizontal_std, new_share * fix.vertical_std

@@ -119,6 +119,7 @@ def start_from_pose(
         age,
         0.0,
         TRACKER,
+        old.turning_accel,
     )
     v = vehicle.v_quad
     reset_past_states(history, X_QUAD, 3, (pose.x_quad[0], pose.x_quad[1], pose.x_quad[2], 0.0))

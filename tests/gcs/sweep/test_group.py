@@ -126,6 +126,39 @@ def test_an_attachment_that_is_told_is_flown_better(short: str) -> None:
     assert error({**offset, **known}) < 0.8 * error(offset)
 
 
+IMU_PLACE = {"IMU_POS_X": 0.03, "IMU_POS_Y": -0.02, "IMU_POS_Z": 0.03}
+ANTENNA_PLACE = {"GPS_POS_X": -0.1, "GPS_POS_Y": 0.02, "GPS_POS_Z": 0.15}
+
+
+def true_and_told(places: Mapping[str, float]) -> tuple[dict[str, float], dict[str, float]]:
+    """Settings that place sensors in the world, and the same with an autopilot that is told of it."""
+    true = {f"SIM_{name}": place for name, place in places.items()}
+    return true, {**true, **{f"VEH_{name}": place for name, place in places.items()}}
+
+
+def test_same_bits_with_sensors_beside_the_centre_and_axes_with_errors(short: str) -> None:
+    errors = {"SIM_ACC_SCALE_Z": 1.0, "SIM_ACC_ALIGN_X": 0.5, "SIM_GYR_SCALE_X": 1.0, "SIM_GYR_ALIGN_Y": 0.5}
+    _, told = true_and_told({**IMU_PLACE, **ANTENNA_PLACE})
+    _, share = both_ways(short, {"CTL_LAW": PLUMBLINE, **told, **errors}, EIGHT, "rtk")
+    assert share > 0.1
+
+
+@pytest.mark.parametrize(("places", "sensors"), [(IMU_PLACE, "lab"), (ANTENNA_PLACE, "rtk")])
+def test_places_of_sensors_that_are_told_cost_nothing(
+    short: str, places: Mapping[str, float], sensors: str
+) -> None:
+    """The worst of some flights; without being told, they are farther off."""
+    mission = load_mission(short)
+
+    def error(settings: Mapping[str, float]) -> float:
+        flown = (Conditions(sensors=sensors, seed=seed, settings=settings) for seed in (1, 2, 3))
+        return max(fly(mission, one, start_times(mission, one)).load_error_max_m for one in flown)
+
+    plain, (true, told) = error({}), true_and_told(places)
+    assert error(told) < 1.1 * plain
+    assert error(true) > 1.5 * plain
+
+
 def test_a_load_that_is_released_is_flown_alone(delivery: str) -> None:
     flown, share = both_ways(delivery, {"CTL_LAW": PLUMBLINE}, range(1, 4))
     assert {one.outcome for one in flown} == {"completed"}
