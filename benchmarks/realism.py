@@ -35,6 +35,24 @@ BATTERY = {"SIM_BATTERY": 1, "SIM_BAT_CHARGE": 90, "SIM_THR_CURVE": 0.57, "SIM_T
 OFF_CENTRE = {"X": 0.008, "Y": -0.004, "Z": -0.02}
 ATTACHMENT = {f"SIM_ATT_{axis}": place for axis, place in OFF_CENTRE.items()}
 CONFIGURED = {f"VEH_ATT_{axis}": place for axis, place in OFF_CENTRE.items()}
+
+
+def told(places: Mapping[str, float]) -> dict[str, float]:
+    """The same places of sensors, and an autopilot that assumes them."""
+    return {**places, **{name.replace("SIM_", "VEH_"): place for name, place in places.items()}}
+
+
+def axes(name: str, percent_or_degrees: float) -> dict[str, float]:
+    """Errors of three axes, of both signs."""
+    signs = {"X": 1.0, "Y": -1.0, "Z": 1.0}
+    return {f"{name}_{axis}": sign * percent_or_degrees for axis, sign in signs.items()}
+
+
+UNIT_ABOVE = {"SIM_IMU_POS_X": 0.02, "SIM_IMU_POS_Y": -0.01, "SIM_IMU_POS_Z": 0.03}
+UNIT_BELOW = {**UNIT_ABOVE, "SIM_IMU_POS_Z": -0.015}
+ANTENNA = {"SIM_GPS_POS_X": -0.05, "SIM_GPS_POS_Z": 0.15}
+SCALE = {**axes("SIM_ACC_SCALE", 1.0), **axes("SIM_GYR_SCALE", 1.0)}
+ALIGNMENT = {**axes("SIM_ACC_ALIGN", 1.0), **axes("SIM_GYR_ALIGN", 1.0)}
 VIBRATION = {"SIM_VIB_ACC": 2, "SIM_VIB_GYR": 0.05}
 CORD = {"SIM_CBL_LINKS": 4, "SIM_CBL_MASS": 0.003, "SIM_CABLE_DIAM": 2}
 WINDY = {"SIM_WIND_E": 5, "SIM_GUST_STD": 1}
@@ -60,6 +78,11 @@ EFFECTS = (
     Effect("vibration of 2 m/s² and 0.05 rad/s, low-pass 98 Hz", {**VIBRATION, "SIM_IMU_LPF_HZ": 98}),
     Effect("white noise, 0.3 m/s² and 0.02 rad/s", {"SIM_ACC_NOISE": 0.3, "SIM_GYR_NOISE": 0.02}),
     Effect("white noise, 1.0 m/s² and 0.05 rad/s", {"SIM_ACC_NOISE": 1.0, "SIM_GYR_NOISE": 0.05}),
+    Effect("inertial unit 3 cm above the centre of mass", UNIT_ABOVE),
+    Effect("inertial unit 1.5 cm below the centre of mass", UNIT_BELOW),
+    Effect("inertial unit 1.5 cm below the centre of mass, told", told(UNIT_BELOW)),
+    Effect("scale of the inertial unit's axes, 1 %", SCALE),
+    Effect("alignment of the inertial unit's axes, 1°", ALIGNMENT),
     Effect("readings late at random, 5 ms on average", {"SIM_SENS_JIT_MS": 5}),
     Effect("clocks 2 ms apart", {"SIM_SENS_OFS_MS": 2}),
     Effect("trackers' correlated error, 1 mm", {"SIM_TRK_ERR_M": 0.001}),
@@ -71,6 +94,9 @@ EFFECTS = (
     Effect("`rtk`", sensors="rtk"),
     Effect("`rtk`, multipath of 1 cm", {"SIM_GPS_MP_M": 0.01}, "rtk"),
     Effect("`rtk`, floating twice a minute", {"SIM_GPS_FLT": 2}, "rtk"),
+    Effect("`rtk`, antenna 15 cm above the centre of mass", ANTENNA, "rtk"),
+    Effect("`rtk`, antenna 15 cm above the centre of mass, told", told(ANTENNA), "rtk"),
+    Effect("`rtk`, alignment of the inertial unit's axes, 1°", ALIGNMENT, "rtk"),
     Effect("`rtk`, motor currents, 20 mG", {"SIM_MAG_MOT": 0.02}, "rtk"),
     Effect("`field`", sensors="field"),
     Effect("`heavy`", vehicle="heavy"),
