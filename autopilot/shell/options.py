@@ -197,14 +197,9 @@ class StopRequest:
             raise Stop(self._name)
 
 
-def print_stop(program: str, at_us: int, stopped_by: str, summary: str, quiet: bool) -> None:
-    """Print when and by which signal a program was stopped, and the summary of its work; if `quiet`, only the
-    former, unless it was Ctrl-C."""
-    text = f"{program}: stopped at t = {at_us / 1e6:.3f} s by {stopped_by}"
-    if not quiet:
-        print("; ".join(filter(None, (text, summary))), flush=True)
-    elif stopped_by != signal.SIGINT.name:
-        print(text, file=sys.stderr, flush=True)
+def stop_text(at_us: int, stopped_by: str, summary: str) -> str:
+    """When and by which signal a program was stopped, and the summary of its work."""
+    return "; ".join(filter(None, (f"stopped at t = {at_us / 1e6:.3f} s by {stopped_by}", summary)))
 
 
 def set_timeout(sock: socket.socket, seconds: float) -> None:

@@ -43,10 +43,10 @@ from autopilot.shell.options import (
     address_text,
     os_error_text,
     print_errors,
-    print_stop,
     reduce_latency,
     send,
     set_timeout,
+    stop_text,
 )
 from autopilot.shell.setting_names import check_names
 from autopilot.shell.steady_clock import SteadyClock
@@ -453,4 +453,4 @@ def fly(
         worker.close()
     if program is not None:
         cost = "" if lockstep else program.cost.summary()
-        print_stop("autopilot", program.onboard.now_us, stopped_by, cost, quiet)
+        notify(stop_text(program.onboard.now_us, stopped_by, cost))

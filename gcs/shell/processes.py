@@ -126,7 +126,8 @@ class Child:
         ending = f"ended with exit code {code}"
         if code < 0:
             ending = f"was killed by {signal.Signals(-code).name}"
-        return f"{self.name} {ending}{': ' + line if line else ', without a word'}"
+        silent = ", as after SIGTERM" if code == 0 else ", without a word"
+        return f"{self.name} {ending}{': ' + line if line else silent}"
 
     def terminate(self) -> None:
         """Ask it to end."""

@@ -20,8 +20,8 @@ from autopilot.shell.options import (
     address_text,
     os_error_text,
     print_errors,
-    print_stop,
     reduce_latency,
+    stop_text,
 )
 from autopilot.vehicle.shipped import VehicleFileError
 from autopilot.wire.convert.geodesy import Home
@@ -189,7 +189,7 @@ def simulate(
             link.close()
     if simulator is not None and link is not None:
         summary = _summary(simulator, real_time, pacing, link.served_s)
-        print_stop("sitl", simulator.now_us, stopped_by, summary, quiet)
+        notify(stop_text(simulator.now_us, stopped_by, summary))
 
 
 def _summary(simulator: HilSimulator, real_time: bool, pacing: Pacing, wall_s: float) -> str:

@@ -68,15 +68,6 @@ def test_mission_and_parameters_outlive_a_killed_autopilot(
     assert json.loads(downloaded.stdout) == json.loads(uploaded)
 
 
-def test_an_autopilot_that_is_terminated_says_so(start: Start, tmp_path: Path) -> None:
-    ports = ("--sim", f"{LOOPBACK}:{free_port()}", "--gcs", ground_port(), "--api", "none")
-    program = start("autopilot", *map(str, ports), "--storage", str(tmp_path))
-    program.says(b"looking for the simulator")
-    program.process.terminate()
-    assert program.process.wait(60.0) == 0
-    assert "autopilot: stopped at t = 0.000 s by SIGTERM" in program.log.read_text()
-
-
 def test_ctrl_c_stops_everything_and_still_writes_what_was_captured(start: Start, tmp_path: Path) -> None:
     out = tmp_path / "out"
     flight = start("gcs", "fly", "hover", "--sensors", "ideal", "--speed", "2", "--out", str(out))

@@ -7,7 +7,7 @@ import signal
 
 import pytest
 
-from autopilot.shell.options import Stop, StopRequest, print_stop
+from autopilot.shell.options import Stop, StopRequest
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP, signal.SIGINT])
@@ -22,14 +22,3 @@ def test_the_signal_is_named(number: signal.Signals, monkeypatch: pytest.MonkeyP
     finally:
         for one, handler in before.items():
             signal.signal(one, handler)
-
-
-def test_a_quiet_program_tells_only_that_another_than_its_user_stopped_it(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    print_stop("autopilot", 1_500_000, "SIGTERM", "no tick was late", quiet=False)
-    assert capsys.readouterr() == ("autopilot: stopped at t = 1.500 s by SIGTERM; no tick was late\n", "")
-    print_stop("autopilot", 1_500_000, "SIGTERM", "no tick was late", quiet=True)
-    assert capsys.readouterr() == ("", "autopilot: stopped at t = 1.500 s by SIGTERM\n")
-    print_stop("autopilot", 1_500_000, "SIGINT", "", quiet=True)
-    assert capsys.readouterr() == ("", "")

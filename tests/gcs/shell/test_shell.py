@@ -513,6 +513,9 @@ def test_the_prefix_of_the_program_is_said_once(tmp_path):
         assert child.exit_report() == "timeit ended with exit code 1: cannot listen on 127.0.0.1:1"
         child.exit_code = -9
         assert child.exit_report().startswith("timeit was killed by SIGKILL: ")
+        child.log.write_text("")
+        child.exit_code = 0
+        assert child.exit_report() == "timeit ended with exit code 0, as after SIGTERM"
 
 
 @pytest.mark.parametrize("cores", [1, 2])
