@@ -5,6 +5,7 @@ from __future__ import annotations
 import atexit
 import gc
 import os
+import signal
 import sys
 
 
@@ -32,6 +33,10 @@ def main() -> None:
 
         sys.stderr.write("gcs: stopped\n")
         sys.exit(EXIT_INTERRUPTED)
+    finally:
+        signal.signal(
+            signal.SIGINT, signal.SIG_IGN
+        )  # Python only ends now, and must not be interrupted in that
 
 
 if __name__ == "__main__":

@@ -247,8 +247,16 @@ def _stopped_with_us(program: subprocess.Popen[str]) -> Iterator[None]:
 def _run(arguments: list[str], quiet: bool) -> None:
     """Run `gcs sweep`. Its progress goes to our stderr, and so does, even if `quiet`, all that a law prints.
     If the sweep fails, its last message becomes the text of the error."""
+    from gcs.shell.processes import end_with_parent
+
     command = [sys.executable, "-P", "-m", "gcs", "sweep", *arguments, *(["--quiet"] if quiet else [])]
-    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as program:
+    with subprocess.Popen(
+        command,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=end_with_parent(signal.SIGTERM),  # noqa: PLW1509, it only calls the kernel
+    ) as program:
         assert program.stderr is not None
         messages: list[str] = []
         other_lines: list[str] = []

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from multiprocessing import get_context, parent_process
+from multiprocessing import active_children, get_context, parent_process
 from typing import Any, Generic, Protocol, TypeVar, runtime_checkable
 
 from autopilot.shell.options import can_fork
@@ -119,10 +119,14 @@ class PoolBackend(Generic[F, R]):
 
 @contextmanager
 def local_processes(jobs: int) -> Iterator[tuple[Executor, int]]:
-    """`jobs` worker processes on this machine."""
+    """`jobs` worker processes on this machine, which are killed if a second Ctrl-C abandons their flights."""
     executor = LocalProcesses(jobs)
     try:
         yield executor, jobs
+    except KeyboardInterrupt:
+        for worker in active_children():
+            worker.kill()
+        raise
     finally:
         executor.shutdown(wait=True, cancel_futures=True)
 

@@ -62,7 +62,7 @@ class Child:
                 stderr=subprocess.STDOUT,
                 process_group=0,
                 pass_fds=descriptors,
-                preexec_fn=_die_with_parent(),  # noqa: PLW1509, there are no threads
+                preexec_fn=end_with_parent(),  # noqa: PLW1509, there are no threads
             )
 
     def start_with(self, arguments: Sequence[str], log: Path) -> bool:
@@ -291,15 +291,15 @@ def _current_core(allowed: set[int]) -> int:
     return core if core in allowed else min(allowed)
 
 
-def _die_with_parent() -> Callable[[], None] | None:
-    """A function that the child runs before the program: it asks the kernel to kill the child when we die."""
+def end_with_parent(number: signal.Signals = signal.SIGKILL) -> Callable[[], None] | None:
+    """A function that a child runs before its program: it asks the kernel for this signal when we die."""
     if not sys.platform.startswith("linux"):
         return None
     libc = ctypes.CDLL(None)
     parent = os.getpid()
 
     def request() -> None:
-        libc.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+        libc.prctl(_PR_SET_PDEATHSIG, number)
         if os.getppid() != parent:  # we died before the call
             os._exit(1)
 

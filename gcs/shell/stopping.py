@@ -1,4 +1,4 @@
-"""Ctrl-C: the first requests an orderly stop, the second abandons what is still being done.
+"""Ctrl-C: the first requests an orderly stop, the second abandons what is still being done; more do nothing.
 
 SIGTERM does the same. Closing the terminal requests an orderly stop too, and repeating it has no effect: both
 the shell and the system send the signal.
@@ -27,7 +27,7 @@ class StopRequest:
 
     def __init__(self, hint: str) -> None:
         self.hint = hint
-        self._is_requested = False
+        self._is_requested = self._is_abandoned = False
         self._process = os.getpid()
         self._before: dict[signal.Signals, object] = {}
 
@@ -45,7 +45,8 @@ class StopRequest:
         if os.getpid() != self._process:
             return  # a forked process: the terminal signals both, and the parent decides
         if self._is_requested:
-            if number != signal.SIGHUP:
+            if number != signal.SIGHUP and not self._is_abandoned:
+                self._is_abandoned = True
                 _received.append(number)
                 raise KeyboardInterrupt
             return

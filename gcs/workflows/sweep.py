@@ -151,7 +151,7 @@ def run_sweep(options: SweepOptions) -> Sweep:
             lambda: bool(stop),
             options.quiet,
             options.fresh,
-            partial(warm_up, quiet=options.quiet),
+            partial(warm_up, quiet=options.quiet, stopped=lambda: bool(stop)),
         )
         laws = [flights for flights in flights_by_law(Store(directory, plan).read(), plan) if flights.outcome]
         found = [one for flights in laws for one in standouts(flights)]

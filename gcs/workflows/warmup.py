@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import tempfile
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 from autopilot.geometry.machine_code import (
@@ -18,7 +18,7 @@ from autopilot.geometry.machine_code import (
 from autopilot.shell.compiling import CABLE, SIMULATOR, Part, autopilot_parts
 from autopilot.vehicle.parameters import LAWS
 from autopilot.vehicle.shipped import VEHICLES
-from gcs.errors import GcsError, reason
+from gcs.errors import GcsError, StoppedError, reason
 from gcs.shell.display import CompileDisplay, notify
 from gcs.shell.processes import Child, Processes
 from gcs.workflows.expected import duration_text, expected_s, remaining_s
@@ -73,9 +73,9 @@ def all_sweep_parts(laws: Sequence[str]) -> list[Part]:
     return [*alone, *(lanes_part(law) for law in laws if law in LAWS)]
 
 
-def warm_up(parts: Iterable[Part], quiet: bool = False) -> None:
+def warm_up(parts: Iterable[Part], quiet: bool = False, stopped: Callable[[], bool] = lambda: False) -> None:
     """Compile those of these parts that are not compiled yet, the longest first; if the machine code cannot
-    be kept, for this program alone, with a warning."""
+    be kept, for this program alone, with a warning. StoppedError as soon as `stopped` returns True."""
     waiting = sorted((part for part in parts if not part.ready), key=lambda part: -part.cost_s)
     if not waiting:
         return
@@ -133,6 +133,8 @@ def warm_up(parts: Iterable[Part], quiet: bool = False) -> None:
                 remaining_text(time.monotonic()),
             )
             time.sleep(_POLL_S)
+            if stopped():
+                raise StoppedError("stopped while the flight software was compiled")
             for title, (part, child, part_start_s) in list(running.items()):
                 if child.running:
                     continue

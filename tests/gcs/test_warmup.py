@@ -11,7 +11,7 @@ from click.testing import CliRunner
 
 from autopilot.shell.compiling import Part
 from gcs.cli import gcs
-from gcs.errors import GcsError
+from gcs.errors import GcsError, StoppedError
 from gcs.shell.display import CompileDisplay
 from gcs.sweep.warmup import sweep_parts
 from gcs.workflows.warmup import flight_parts, vehicle_parts, warm_up
@@ -129,6 +129,13 @@ def test_a_part_that_fails_is_told_with_its_last_words_and_not_marked():
     with pytest.raises(GcsError, match=r"the bad cannot be compiled: .*no compiler"):
         warm_up([bad, good], quiet=True)
     assert not bad.ready
+
+
+def test_a_stop_ends_it_at_once():
+    endless = part("endless", "import signal; signal.pause()")
+    with pytest.raises(StoppedError, match="stopped while the flight software was compiled"):
+        warm_up([endless], quiet=True, stopped=lambda: True)
+    assert not endless.ready
 
 
 def test_what_is_compiled_is_told_kernel_by_kernel(capsys):

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import signal
 import threading
 from collections.abc import Iterator
-from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from concurrent.futures import Executor, Future, ThreadPoolExecutor, wait
+from multiprocessing import active_children
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from gcs.batch import pool
-from gcs.batch.pool import PoolBackend
+from gcs.batch.pool import PoolBackend, local_processes
 from gcs.batch.runner import fly_all
 from gcs.errors import GcsError
 from gcs.sweep import work
@@ -114,3 +116,16 @@ def test_a_sweep_begins_no_flight_after_it_was_stopped(monkeypatch: pytest.Monke
         prepared: Any = SimpleNamespace(plan=plan, files={}, lane_laws=frozenset())
         rows = work.fly_cases(prepared, cases, lambda: 0.0, lambda: len(flown) == 11)
         assert [row["index"] for row in rows] == flown == list(range(11))
+
+
+def _never_ends() -> None:
+    signal.pause()
+
+
+def test_what_is_abandoned_is_not_waited_for() -> None:
+    with pytest.raises(KeyboardInterrupt), local_processes(1) as (executor, _):
+        flying = executor.submit(_never_ends)
+        while not flying.running():
+            wait([flying], 0.01)
+        raise KeyboardInterrupt
+    assert not active_children()
