@@ -34,9 +34,8 @@ def main() -> None:
         sys.stderr.write("gcs: stopped\n")
         sys.exit(EXIT_INTERRUPTED)
     finally:
-        signal.signal(
-            signal.SIGINT, signal.SIG_IGN
-        )  # Python only ends now, and must not be interrupted in that
+        # Python only ends now, and must not be interrupted in that
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 if __name__ == "__main__":
