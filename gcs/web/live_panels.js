@@ -62,9 +62,9 @@
       this.serverEnded = hasEnded;
       document.body.classList.toggle("stale", this.isStale);
       if (state) this.show(state);
-      else if (!this.session.outcome) {
+      else {
         this.showBanner(null);
-        this.showChip(hasEnded ? NO_SERVER : NO_VEHICLE, hasEnded ? "bad" : "");
+        if (!this.session.outcome) this.showChip(hasEnded ? NO_SERVER : NO_VEHICLE, hasEnded ? "bad" : "");
       }
     }
 
@@ -185,6 +185,7 @@
       if (outcome) {
         text = reason ? `${outcome}: ${reason}` : outcome;
         good = outcome === "completed";
+        if (this.serverEnded) text += `; ${NO_SERVER}`; // and serves no report
       } else if (this.isStale) {
         text = "The server of this page has ended";
         if (state) text += "; the page shows the last state that it has received";
@@ -197,7 +198,7 @@
       box.hidden = !text;
       box.classList.toggle("good", good);
       box.replaceChildren(document.createTextNode(text));
-      if (outcome && report) {
+      if (outcome && report && !this.serverEnded) {
         const link = document.createElement("a");
         link.href = report;
         link.target = "_blank";

@@ -106,8 +106,12 @@ class FlightPage:
             self._wait(_READER_S, lambda: bool(self._readers or stop))
 
     def keep_open(self, stop: StopRequest) -> None:
-        """Keep the page until the last browser closes it, or until Ctrl-C."""
+        """Keep the page, if a browser has opened it, until the last one closes it, or until Ctrl-C."""
         if stop:
+            return
+        self._receive()
+        if not self._had_readers:
+            notify("no page was opened: the live page ends with the flight")
             return
         notify("the page stays until it is closed or Ctrl-C ends it")
         closed_s = 0.0

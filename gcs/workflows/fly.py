@@ -135,7 +135,7 @@ def fly(
             folder.unlock()
             if page is not None:
                 page.send_event(report=str(out.resolve()))
-                stop.hint = "the page is closed"  # the report is complete and can no longer be abandoned
+                stop.hint = "ending the live page; the report is complete"
                 page.keep_open(stop)
             return flight
 

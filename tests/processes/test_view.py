@@ -148,6 +148,28 @@ def test_a_lockstep_flight_is_the_same_with_the_page_open(start: Callable[..., A
     assert max(heights) > 0.9  # the page has seen it fly
 
 
+def test_without_a_page_that_was_opened_the_command_ends_with_the_flight(
+    start: Callable[..., Any], tmp_path: Path
+) -> None:
+    flight = start("gcs", "fly", "hover", "--view", "--out", str(tmp_path / "out"), "--quiet")
+    page_of(flight)
+    assert flight.process.wait(100.0) == 0
+    assert "gcs: no page was opened" in flight.log.read_text()
+
+
+def test_ctrl_c_after_the_flight_ends_the_page_and_says_so(
+    start: Callable[..., Any], browser: Browser, tmp_path: Path
+) -> None:
+    flight = start("gcs", "fly", "hover", "--view", "--out", str(tmp_path / "out"), "--quiet")
+    browser.open(page_of(flight))
+    browser.wait("document.querySelector('#banner a')", 90.0)
+    flight.says(rb"the page stays until it is closed")
+    assert flight.interrupt() == 0
+    assert flight.log.read_text().endswith("gcs: ending the live page; the report is complete\n")
+    browser.wait("!document.querySelector('#banner a')")
+    assert "the server of this page has ended" in browser.find("#banner").text
+
+
 @contextmanager
 def viewed_vehicle(
     start: Callable[..., Any], browser: Browser

@@ -96,12 +96,24 @@ def test_a_page_without_a_vehicle_says_so_too(page: Browser) -> None:
     assert page.run(f"return [{CHIP}, {BANNER}.hidden]") == ["waiting for a vehicle", True]
 
 
-def test_a_flight_that_is_over_keeps_its_outcome(page: Browser) -> None:
-    say(page, {"type": "state", "vehicles": [HOVERING], "samples": {}})
-    say(page, {"type": "session", "kind": "fly", "outcome": "completed", "reason": ""})
+FLOWN = {"type": "session", "kind": "fly", "outcome": "completed", "reason": "", "report": "report.html"}
+
+
+def test_a_flight_that_is_over_keeps_its_outcome_and_links_to_no_report_of_a_server_that_has_ended(
+    page: Browser,
+) -> None:
+    say(page, {"type": "state", "vehicles": [HOVERING], "samples": {}}, FLOWN)
+    shown = f"return [{CHIP}, {BANNER}.textContent, {BANNER}.querySelectorAll('a').length]"
+    assert page.run(shown) == ["completed", "completedOpen the report", 1]
     page.run("sockets[0].end()")
     wait_for_panels(page)
-    assert page.run(f"return [{CHIP}, {BANNER}.textContent]") == ["completed", "completed"]
+    assert page.run(shown) == ["completed", f"completed; {ENDED}", 0]
+
+
+def test_a_flight_that_is_over_without_a_state_says_that_the_server_has_ended(page: Browser) -> None:
+    say(page, FLOWN)
+    page.run("sockets[0].end()")
+    assert page.run(f"return {BANNER}.textContent") == f"completed; {ENDED}"
 
 
 BUTTONS = """
