@@ -168,5 +168,5 @@ def gcs(signing_key: bytes | None) -> None:
 
     Results are on stdout, everything else on stderr. Exit codes: 0 done, 1 a known error, 2 wrong input,
     3 flown, but the mission was not completed, 4 flown, but a --require condition failed; stopped: 130 by
-    Ctrl-C, 143 by SIGTERM, 129 by SIGHUP (the terminal was closed).
+    Ctrl-C, 143 by SIGTERM, 129 by SIGHUP (the terminal was closed); gcs view ends so with 0.
     """

@@ -89,4 +89,5 @@ def load_command(file: Path, address: Address) -> None:
     done, total = load_parameters(file, address)
     click.echo(f"{done} of {total} parameters set from {file}")
     if done < total:
-        raise GcsError(f"{total - done} of {total} parameters of {file} were refused; the others are set")
+        others = "; the others are set" if done else ""
+        raise GcsError(f"{total - done} of {total} parameters of {file} were refused{others}")

@@ -15,7 +15,7 @@ _TERMINATED = {mavlink.PLUMBLINE_PHASE_FAILSAFE: "the flight was terminated, the
 # what the flight does in these phases until it is done, except to land
 _NOT_TO_RETURN = {mavlink.PLUMBLINE_PHASE_SET_DOWN: "the vehicle lands", **_TERMINATED}
 _NOT_TO_HOLD = {_TAUTEN: "the cable is tautened: land, or wait until the load is lifted", **_NOT_TO_RETURN}
-_FLOWN = "the mission is flown already"
+_FLOWN = "the mission is being flown"
 _NOT_TO_START = {_LIFT: "the load is being lifted", _MISSION: _FLOWN, **_NOT_TO_HOLD}
 _IDLE_MODES = ("hold", "guided", "loiter")  # on the ground: arming begins nothing
 _MISSION_MODES = ("mission", "auto")

@@ -56,7 +56,8 @@ def new_file(kind: str, name: str) -> NewFile:
     word = given.name.removesuffix(suffix)
     if not _NAME.fullmatch(word):
         raise InputError(
-            f"{name!r} cannot be the name of a {kind}: letters, digits, - and _, beginning with a letter"
+            f"{name!r} cannot be the name of the new {kind}: "
+            "at most 64 of A-Z, a-z, 0-9, - and _, beginning with a letter"
         )
     # the name of a module must be an identifier
     stem = word.replace("-", "_") if suffix == ".py" else word

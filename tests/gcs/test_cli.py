@@ -755,6 +755,9 @@ def test_parameters(live, tmp_path):
     assert each.startswith("gcs: NOPE: no such parameter; ")
     assert total == f"gcs: 1 of 3 parameters of {file} were refused; the others are set"
     assert (vehicle.parameters["P001"], vehicle.parameters["P002"]) == (3.0, 4.0)
+    file.write_text("NOPE 1\n")
+    result = run("param", "load", str(file), "--connect", port)
+    assert result.stderr.splitlines()[-1] == f"gcs: 1 of 1 parameters of {file} were refused"
 
 
 @pytest.mark.parametrize("program", ["gcs missions", "sitl --help", "autopilot --help"])

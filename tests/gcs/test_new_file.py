@@ -98,8 +98,11 @@ def test_a_name_may_lead_into_a_folder_and_have_its_ending() -> None:
 @pytest.mark.parametrize(
     ("words", "code", "part"),
     [
-        (("mission", ""), EXIT_USAGE, "'' cannot be the name of a mission"),
-        (("mission", 'a"b'), EXIT_USAGE, "letters, digits, - and _"),
+        (("mission", ""), EXIT_USAGE, "'' cannot be the name of the new mission"),
+        (("estimator", "1"), EXIT_USAGE, "'1' cannot be the name of the new estimator"),
+        (("mission", "Übung"), EXIT_USAGE, "A-Z, a-z, 0-9, - and _"),
+        (("mission", 'a"b'), EXIT_USAGE, "A-Z, a-z, 0-9, - and _"),
+        (("mission", "a" * 65), EXIT_USAGE, "at most 64"),
         (("mission", "1st"), EXIT_USAGE, "beginning with a letter"),
         (
             ("mission", "/dev/null/such"),
