@@ -15,6 +15,19 @@ export PYTHONDONTWRITEBYTECODE :=
 # if colorama is installed, numba colours the error text of each candidate it tries, never shown: a twentieth of the time
 export NUMBA_DISABLE_ERROR_MESSAGE_HIGHLIGHTING := 1
 
+# an environment keeps the Python that it was made with, and PYTHON= would be ignored
+ifeq ($(origin PYTHON),command line)
+ifneq ($(wildcard $(BIN)/python),)
+ifneq ($(filter-out help oldest clean,$(MAKECMDGOALS)),)
+python_of = $(shell $(1) -c 'import sys; print("%d.%d" % sys.version_info[:2])')
+made_with := $(call python_of,$(BIN)/python)
+ifneq ($(call python_of,$(PYTHON)),$(made_with))
+$(error $(VENV) is of Python $(made_with), which $(PYTHON) is not; make clean first)
+endif
+endif
+endif
+endif
+
 .PHONY: help install fly test lint types docs oldest thesis figures pictures robustness renew bench clean
 
 help: ## what can be made
