@@ -45,7 +45,7 @@ _MAX_PARTS = 3  # of a label; further differences are in the table
 STEPS = "mission steps"
 _NOT_IN_LABELS = {STEPS}  # differences that labels do not mention
 _HEADING = 14  # characters in a line of the name of a flight, in the terminal
-_LABELS = 32  # characters before the columns of the flights
+_UNLIMITED = 10_000  # characters, more than any table has
 _DRAWN_COLUMNS = {
     "load",
     "vehicle",
@@ -267,7 +267,9 @@ def comparison(runs: Sequence[Run]) -> Json:
 
 def fits_in_columns(runs: Sequence[Run], width: int) -> bool:
     """Whether a terminal of this width, in characters, has room for a column for each flight."""
-    return _LABELS + len(runs) * (_HEADING + 2) <= width
+    from rich.console import Console
+
+    return Console(width=_UNLIMITED).measure(comparison_table(runs)).maximum <= width
 
 
 def comparison_table(runs: Sequence[Run]) -> Table:
@@ -279,10 +281,10 @@ def comparison_table(runs: Sequence[Run]) -> Table:
     table = Table(box=SIMPLE_HEAD, pad_edge=False)
     table.add_column("", no_wrap=True)
     for run in runs:
-        table.add_column(Text(heading(run.name)), justify="right", overflow="fold")
+        table.add_column(Text(heading(run.name)), justify="right", no_wrap=True)
     different = differences(runs)
     for one in different:
-        cells = [Text(_shortened(value)) for value in one.values]
+        cells = [Text(heading(_shortened(value))) for value in one.values]
         table.add_row(Text(one.name), *cells, end_section=one is different[-1])
     for group, rows in figures(runs):
         table.add_row(Text(group.title, style="bold"))

@@ -49,7 +49,8 @@ def overview(runs: Sequence[Run], width: int) -> tuple[Table, list[str]]:
     from rich.table import Table
     from rich.text import Text
 
-    free = width - min(_MAX_NAME_CHARS, max(_MIN_NAME_CHARS, *(len(run.name) for run in runs))) - _COLUMN_GAP
+    name_chars = min(_MAX_NAME_CHARS, max(_MIN_NAME_CHARS, *(len(run.name) for run in runs)))
+    free = width - name_chars - _COLUMN_GAP
     columns, omitted = [], [one.name for one in differences(runs)]
     settings = given_settings(runs)
     lacks_setting = False  # then no parameter that follows from the settings is shown in its place
@@ -67,7 +68,8 @@ def overview(runs: Sequence[Run], width: int) -> tuple[Table, list[str]]:
     for column in columns:
         table.add_column(Text(column.title), justify="right", no_wrap=True)
     for i, run in enumerate(runs):
-        table.add_row(Text(run.name), *(cell(one.values[i], i in one.best) for one in columns))
+        name = Text(heading(run.name, name_chars + free))
+        table.add_row(name, *(cell(one.values[i], i in one.best) for one in columns))
     return table, omitted
 
 

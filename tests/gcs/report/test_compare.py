@@ -260,6 +260,20 @@ def test_headings_of_the_table_are_whole_in_a_narrow_terminal(runs: list[Path]) 
     assert all(any(line.startswith(label) for line in lines) for label in labels)
 
 
+@pytest.mark.parametrize("width", [60, 80, 100, 120])
+def test_long_names_are_broken_between_their_parts(runs: list[Path], width: int) -> None:
+    folders = ("/tmp/measurements/Größe", "/tmp/measurements/of-another-day", "/tmp/measurements/third")
+    found = [replace(loaded(run), name=f"{folder}/a") for run, folder in zip(runs, folders, strict=True)]
+    in_columns = fits_in_columns(found, width)
+    assert in_columns == (width >= 100)
+    console = Console(width=width, record=True, file=io.StringIO())
+    console.print(comparison_table(found) if in_columns else overview(found, width)[0])
+    said = console.export_text()
+    for part in ("measurements/", "Größe/", "another-", "third/", "completed"):
+        assert part in said
+    assert "…" not in said and max(map(len, said.splitlines())) <= width
+
+
 @pytest.mark.parametrize("width", [80, 120])
 def test_a_dozen_flights_are_a_row_each_in_a_narrow_terminal(runs: list[Path], width: int) -> None:
     three = [loaded(run) for run in runs]
