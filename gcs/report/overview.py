@@ -68,8 +68,8 @@ def overview(runs: Sequence[Run], width: int) -> tuple[Table, list[str]]:
     for column in columns:
         table.add_column(Text(column.title), justify="right", no_wrap=True)
     for i, run in enumerate(runs):
-        name = Text(heading(run.name, name_chars + free))
-        table.add_row(name, *(cell(one.values[i], i in one.best) for one in columns))
+        flight = Text(heading(run.name, name_chars + free))
+        table.add_row(flight, *(cell(one.values[i], i in one.best) for one in columns))
     return table, omitted
 
 
