@@ -52,6 +52,17 @@ def test_what_is_written_flies_as_it_is(kind: str) -> None:
     assert flight.summary["load_error_max_m"] < 0.05
 
 
+@pytest.mark.parametrize("seed", [0, 1])
+def test_templates_of_law_estimator_and_sensors_fly_together(seed: int) -> None:
+    for kind in ("law", "estimator", "sensors"):
+        assert run("new", kind, f"my-{kind}").exit_code == EXIT_DONE
+    law, estimator = "my_law.py:MyLaw", "my_estimator.py:MyEstimator"
+    flown = plumbline.fly(
+        SHORT, law=law, estimator=estimator, sensors="my-sensors.toml", seed=seed, quiet=True
+    )
+    assert (flown.outcome, flown.reason) == ("completed", "")
+
+
 def written_command(path: Path) -> str:
     """The command that is stated in the file."""
     (line,) = re.findall(r"Fly it:\s+(gcs fly .*)", path.read_text(encoding="utf-8"))
