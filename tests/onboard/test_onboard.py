@@ -16,7 +16,7 @@ from autopilot.services.mission_store import StoredMission
 from autopilot.services.records import SimulatorParametersSaved
 from autopilot.supervisor.state import Phase
 from autopilot.vehicle.file import load_vehicle
-from autopilot.vehicle.parameters import autopilot_parameters
+from autopilot.vehicle.parameters import BENCH_MEASURED, autopilot_parameters
 from autopilot.wire.codec import FrameWriter, decode
 from autopilot.wire.convert.geodesy import Home, geodetic_from_enu
 from autopilot.wire.convert.simulator import hil_sensor_message, read_hil_actuator_controls, read_hil_sensor
@@ -25,6 +25,8 @@ from autopilot.wire.items import WireItem
 from gcs.closed_loop import Conditions, build_onboard
 from missions.model import Delay, Land, ReturnHome, Step, Takeoff, Waypoint
 from sitl.hil import HilSimulator
+from sitl.vehicles.sim_parameters import sim_parameters
+from sitl.vehicles.truth import load_truth
 from tests.doubles.craft import ACCEPTED, GCS, Craft, at_phase
 from tests.doubles.motion import TICK_S
 
@@ -363,9 +365,11 @@ def test_latency_of_the_sensors_is_believed_unless_a_belief_is_given(
     assert onboard.parameters["VEH_IMU_DELAY"] == believed
 
 
-def test_no_more_latency_is_believed_than_may_be() -> None:
-    onboard = build_onboard(Conditions(settings={"SIM_SENS_LAT_MS": 300.0}), Home())
-    assert onboard.parameters["VEH_IMU_DELAY"] == onboard.parameters.describe("VEH_IMU_DELAY").high
+@pytest.mark.parametrize(("name", "assumed"), BENCH_MEASURED.items())
+def test_all_that_a_vehicle_can_be_late_by_may_be_believed(name: str, assumed: str) -> None:
+    most = sim_parameters(load_truth("bebop")).describe(name).high
+    onboard = build_onboard(Conditions(settings={name: most}), Home())
+    assert onboard.parameters[assumed] == most
 
 
 def test_the_saved_world_is_set_again_in_the_simulator() -> None:
