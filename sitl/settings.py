@@ -79,17 +79,14 @@ def settings_of(table: ParameterTable) -> Settings:
 
 
 def _imu_axes(table: ParameterTable) -> AxisErrors:
-    def vector(name: str) -> Vec3:
-        return (table[f"{name}_X"], table[f"{name}_Y"], table[f"{name}_Z"])
-
     def share(name: str) -> Vec3:
-        x, y, z = vector(name)
+        x, y, z = table.vector(name)
         return (x / 100.0, y / 100.0, z / 100.0)
 
     def angles(name: str) -> Vec3:
-        x, y, z = vector(name)
+        x, y, z = table.vector(name)
         return (radians(x), radians(y), radians(z))
 
     return AxisErrors(
-        share("SIM_ACC_SCALE"), angles("SIM_ACC_ALIGN"), share("SIM_GYR_SCALE"), angles("SIM_GYR_ALIGN")
+        share("SIM_ACC_SCALE_"), angles("SIM_ACC_ALIGN_"), share("SIM_GYR_SCALE_"), angles("SIM_GYR_ALIGN_")
     )

@@ -37,7 +37,7 @@ def believed_vehicle(table: AutopilotParameters) -> Vehicle:
         rotor_max=table["VEH_ROTOR_MAX"],
         thrust_per_force=thrust_per_force,
         moment_per_force=moment_per_force,
-        attachment=(table["VEH_ATT_X"], table["VEH_ATT_Y"], table["VEH_ATT_Z"]),
+        attachment=table.vector("VEH_ATT_"),
     )
 
 

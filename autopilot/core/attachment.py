@@ -25,7 +25,20 @@ from autopilot.estimation.inbox import DIRECTION, FIX, HEIGHT, KIND, POSE, READI
 from autopilot.estimation.records import Array, DirectionReading, EstimatorState, GnssReading, PoseReading
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.lanes import if_above
-from autopilot.geometry.linear import Vec3, add, apply, apply_transposed, column, cross, dot, norm, scale, sub
+from autopilot.geometry.lever_arm import arm_velocity
+from autopilot.geometry.linear import (
+    Vec3,
+    add,
+    apply,
+    apply_transposed,
+    column,
+    cross,
+    dot,
+    is_zero,
+    norm,
+    scale,
+    sub,
+)
 from autopilot.geometry.packed import pack, unpack, with_field
 from autopilot.geometry.so3 import rotation_from_quat
 
@@ -33,8 +46,7 @@ from autopilot.geometry.so3 import rotation_from_quat
 @kernel
 def off_centre(vehicle: Vehicle) -> bool:
     """Whether the cable is assumed to be attached away from the centre of mass."""
-    rho = vehicle.attachment
-    return rho[0] != 0.0 or rho[1] != 0.0 or rho[2] != 0.0
+    return not is_zero(vehicle.attachment)
 
 
 @kernel
@@ -60,18 +72,18 @@ def shift_to_attachment(inbox: Array, count: int, estimator: EstimatorState, att
     omega = estimator.vehicle.omega_body
     distance = norm(sub(estimator.load.x_load, estimator.vehicle.x_quad))
     arm = apply(rotation_from_quat(estimator.vehicle.quat_wxyz), attachment)
-    arm_velocity = apply(rotation_from_quat(estimator.vehicle.quat_wxyz), cross(omega, attachment))
+    velocity = arm_velocity(rotation_from_quat(estimator.vehicle.quat_wxyz), omega, attachment)
     for i in range(count):
         if inbox[i, KIND] == POSE:
             pose = unpack(PoseReading, inbox[i], READING)
             R = rotation_from_quat(pose.quat_wxyz)
             pose = with_field(pose, "x_quad", add(pose.x_quad, apply(R, attachment)))
-            pose = with_field(pose, "v_quad", add(pose.v_quad, apply(R, cross(omega, attachment))))
+            pose = with_field(pose, "v_quad", add(pose.v_quad, arm_velocity(R, omega, attachment)))
             pack(pose, inbox[i], READING)
         elif inbox[i, KIND] == FIX:
             fix = unpack(GnssReading, inbox[i], READING)
             fix = with_field(fix, "position", add(fix.position, arm))
-            pack(with_field(fix, "velocity", add(fix.velocity, arm_velocity)), inbox[i], READING)
+            pack(with_field(fix, "velocity", add(fix.velocity, velocity)), inbox[i], READING)
         elif inbox[i, KIND] == HEIGHT:
             inbox[i, READING] += arm[2]
         elif inbox[i, KIND] == DIRECTION:

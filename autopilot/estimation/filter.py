@@ -127,8 +127,8 @@ def estimator_tuning(table: ParameterTable) -> EstimatorTuning:
         load_height=table["EST_LOAD_H"],
         initial_load_forward=table["EST_LAID_FWD"] * length,
         initial_load_std=table["EST_LAID_STD"] * length,
-        imu_position=(table["VEH_IMU_POS_X"], table["VEH_IMU_POS_Y"], table["VEH_IMU_POS_Z"]),
-        antenna_position=(table["VEH_GPS_POS_X"], table["VEH_GPS_POS_Y"], table["VEH_GPS_POS_Z"]),
+        imu_position=table.vector("VEH_IMU_POS_"),
+        antenna_position=table.vector("VEH_GPS_POS_"),
     )
 
 

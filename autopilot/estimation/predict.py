@@ -65,6 +65,7 @@ from autopilot.geometry.linear import (
     axpy,
     cross,
     dot,
+    is_zero,
     norm,
     scale,
     sub,
@@ -118,7 +119,7 @@ def filtered_body_rate(
 def turning_accel(rate: Vec3, change: Vec3, position: Vec3, dt: float) -> Vec3:
     """What an accelerometer at a `position` (m, from the centre of mass, body) measures of a rotation by
     `rate` (rad/s), which has changed by `change` in dt seconds: W' x r + W x (W x r), m/s^2, body."""
-    if not dt > 0.0 or (position[0] == 0.0 and position[1] == 0.0 and position[2] == 0.0):
+    if not dt > 0.0 or is_zero(position):
         return ZERO
     return axpy(1.0 / dt, cross(change, position), cross(rate, cross(rate, position)))
 

@@ -81,6 +81,12 @@ def norm(a: Vec3) -> float:
 
 
 @kernel
+def is_zero(a: Vec3) -> bool:
+    """Whether every component is exactly 0."""
+    return a[0] == 0.0 and a[1] == 0.0 and a[2] == 0.0
+
+
+@kernel
 def column(A: Mat3, j: int) -> Vec3:
     """Column j of A."""
     return (A[0][j], A[1][j], A[2][j])

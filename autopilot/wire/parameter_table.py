@@ -136,6 +136,10 @@ class ParameterTable:
         except KeyError:
             raise self._unknown(name) from None
 
+    def vector(self, name: str) -> tuple[float, float, float]:
+        """The values of three parameters whose names are this one with X, Y and Z."""
+        return self[f"{name}X"], self[f"{name}Y"], self[f"{name}Z"]
+
     def __contains__(self, name: object) -> bool:
         return name in self._values
 

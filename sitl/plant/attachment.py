@@ -8,16 +8,15 @@
 | n | | body, m | rho x q_b, so that the pull T q exerts the moment T n on the vehicle |
 | mu | effective_mass | kg | 1 / mu = 1/m_L + 1/m_Q + n . J^-1 n |
 
-    x_A'  = x_Q' + R (Omega x rho)
-    x_A'' = x_Q'' + R (Omega' x rho + Omega x (Omega x rho))
-
-With rho = 0 nothing here is added: the equations are, to the bit, those of a cable at the centre of mass.
+`autopilot.geometry.lever_arm` has x_A' and x_A''. With rho = 0 nothing here is added: the equations are, to
+the bit, those of a cable at the centre of mass.
 """
 
 from __future__ import annotations
 
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.linear import Mat3, Vec3, add, apply, apply_transposed, cross, dot, sub
+from autopilot.geometry.lever_arm import arm_accel, arm_velocity
+from autopilot.geometry.linear import Mat3, Vec3, add, apply, apply_transposed, cross, dot, is_zero, sub
 from autopilot.geometry.so3 import rotation_from_quat
 from sitl.plant.records import Motion, Truth
 
@@ -25,8 +24,7 @@ from sitl.plant.records import Motion, Truth
 @kernel
 def is_off_centre(truth: Truth) -> bool:
     """Whether the cable is attached away from the centre of mass."""
-    rho = truth.attachment
-    return rho[0] != 0.0 or rho[1] != 0.0 or rho[2] != 0.0
+    return not is_zero(truth.attachment)
 
 
 @kernel
@@ -38,14 +36,13 @@ def attachment_offset(R: Mat3, truth: Truth) -> Vec3:
 @kernel
 def attachment_velocity(R: Mat3, omega: Vec3, truth: Truth) -> Vec3:
     """x_A' - x_Q'."""
-    return apply(R, cross(omega, truth.attachment))
+    return arm_velocity(R, omega, truth.attachment)
 
 
 @kernel
 def attachment_accel(R: Mat3, omega: Vec3, omega_dot: Vec3, truth: Truth) -> Vec3:
     """x_A'' - x_Q''."""
-    rho = truth.attachment
-    return apply(R, add(cross(omega_dot, rho), cross(omega, cross(omega, rho))))
+    return apply(R, arm_accel(omega, omega_dot, truth.attachment))
 
 
 @kernel

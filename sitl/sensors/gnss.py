@@ -13,10 +13,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.linear import ZERO, Vec3, add, add3, scale, times
+from autopilot.geometry.lever_arm import arm_velocity
+from autopilot.geometry.linear import ZERO, Vec3, add, add3, apply, is_zero, scale, times
+from autopilot.geometry.so3 import rotation_from_quat
 from sitl.plant.records import PlantState
 from sitl.sensors.elementary import logarithm
-from sitl.sensors.lever_arm import has_lever_arm, position_of, velocity_of
 from sitl.sensors.noise import Drift, Noise, drift_start, drift_step, gaussian, uniform
 
 FIXED, FLOATING, LOST = 0.0, 1.0, 2.0  # GnssReading.quality
@@ -96,9 +97,10 @@ def sample(
 ) -> tuple[GnssReading, GnssState]:
     """Position and velocity of the antenna."""
     x_antenna, v_antenna = truth_state.x_quad, truth_state.v_quad
-    if has_lever_arm(config.antenna):
-        x_antenna = position_of(truth_state, config.antenna)
-        v_antenna = velocity_of(truth_state, config.antenna)
+    if not is_zero(config.antenna):
+        R = rotation_from_quat(truth_state.quat_wxyz)
+        x_antenna = add(x_antenna, apply(R, config.antenna))
+        v_antenna = add(v_antenna, arm_velocity(R, truth_state.omega_body, config.antenna))
     slow = times(config.position_error, sensor_state.error)
     position = add3(x_antenna, slow, times(config.position_noise, gaussian(noise, 0)))
     velocity = add(v_antenna, times(config.velocity_noise, gaussian(noise, 1)))

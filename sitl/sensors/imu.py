@@ -14,6 +14,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from autopilot.geometry.kernel import kernel
+from autopilot.geometry.lever_arm import arm_accel
 from autopilot.geometry.linear import (
     IDENTITY,
     ZERO,
@@ -24,11 +25,11 @@ from autopilot.geometry.linear import (
     apply,
     apply_transposed,
     column,
+    is_zero,
     scale,
 )
 from autopilot.geometry.so3 import quat_exp, rotation_from_quat
 from sitl.plant.records import PlantState
-from sitl.sensors.lever_arm import has_lever_arm, turning_accel
 from sitl.sensors.noise import Drift, Noise, drift_start, drift_step, white
 
 
@@ -119,8 +120,8 @@ def sample(
     a = truth_state.accel_quad
     force = apply_transposed(R, (a[0], a[1], a[2] + config.gravity))
     omega = truth_state.omega_body
-    if has_lever_arm(config.position):
-        force = add(force, turning_accel(truth_state, config.position))
+    if not is_zero(config.position):
+        force = add(force, arm_accel(omega, truth_state.omega_dot_body, config.position))
     if config.calibrated == 0.0:
         force, omega = apply(config.accel_axes, force), apply(config.gyro_axes, omega)
     accel = add3(force, sensor_state.accel_bias, white(config.accel_noise, noise, 0))

@@ -77,9 +77,9 @@ def apply(truth: Truth, table: ParameterTable) -> Truth:
         charge=table["SIM_BAT_CHARGE"] * 1e-2,
     )
     return truth._replace(
-        attachment=(table["SIM_ATT_X"], table["SIM_ATT_Y"], table["SIM_ATT_Z"]),
-        imu_position=(table["SIM_IMU_POS_X"], table["SIM_IMU_POS_Y"], table["SIM_IMU_POS_Z"]),
-        antenna_position=(table["SIM_GPS_POS_X"], table["SIM_GPS_POS_Y"], table["SIM_GPS_POS_Z"]),
+        attachment=table.vector("SIM_ATT_"),
+        imu_position=table.vector("SIM_IMU_POS_"),
+        antenna_position=table.vector("SIM_GPS_POS_"),
         air=air,
         drive=drive,
         quad_mass=table["SIM_QUAD_MASS"],

@@ -63,7 +63,18 @@ from autopilot.estimation.records import (
 )
 from autopilot.estimation.tautness import tauten
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.linear import ZERO, Vec3, add, apply, apply_transposed, cross, from_columns, norm, sub
+from autopilot.geometry.linear import (
+    ZERO,
+    Vec3,
+    add,
+    apply,
+    apply_transposed,
+    cross,
+    from_columns,
+    is_zero,
+    norm,
+    sub,
+)
 from autopilot.geometry.packed import with_field
 from autopilot.geometry.s2 import normalise, tangent
 from autopilot.geometry.so3 import quat_from_rotation, rotation_from_quat
@@ -306,7 +317,7 @@ def past_antenna(
     and attitude x (R r)' to theirs; that of the gyroscope's bias in (R r)' is left out.
     """
     r = tuning.antenna_position
-    if r[0] == 0.0 and r[1] == 0.0 and r[2] == 0.0:
+    if is_zero(r):
         return past
     arm = apply(rotation_from_quat(past.quat_wxyz), r)
     arm_velocity = turning_velocity(state.head, history.ring, state.time_s - past.age, r)

@@ -1,0 +1,27 @@
+"""A point of the vehicle away from its centre of mass: where a sensor sits, or the cable is attached.
+
+| symbol | code | frame, unit | |
+|---|---|---|---|
+| r | arm | body, m | from the centre of mass to the point |
+| x_S | | world, m | x_Q + R r |
+
+    x_S'  = x_Q' + R (Omega x r)
+    x_S'' = x_Q'' + R (Omega' x r + Omega x (Omega x r))
+"""
+
+from __future__ import annotations
+
+from autopilot.geometry.kernel import kernel
+from autopilot.geometry.linear import Mat3, Vec3, add, apply, cross
+
+
+@kernel
+def arm_velocity(R: Mat3, omega: Vec3, arm: Vec3) -> Vec3:
+    """x_S' - x_Q'."""
+    return apply(R, cross(omega, arm))
+
+
+@kernel
+def arm_accel(omega: Vec3, omega_dot: Vec3, arm: Vec3) -> Vec3:
+    """R^T (x_S'' - x_Q'')."""
+    return add(cross(omega_dot, arm), cross(omega, cross(omega, arm)))
