@@ -24,6 +24,7 @@ from autopilot.estimation.cable_pull import (
 from autopilot.estimation.clipping import add_impact_noise, update_clipping
 from autopilot.estimation.covariance import PropagationInputs, propagate_covariance
 from autopilot.estimation.history import store_state
+from autopilot.estimation.imu_height import learned_imu_height
 from autopilot.estimation.records import (
     AIDED_SIZE,
     ATTITUDE,
@@ -399,6 +400,7 @@ def predict(
         clipping,
         averaged_missing_pull(load, vehicle, history, state.missing_pull, tuning, dt),
         averaged_slack_pull(state.slack_pull, measured, load, vehicle, R[2][2], history, tuning, dt),
+        learned_imu_height(state.imu_height, force, measured, load, vehicle, moment, tuning, dt),
         frame_share,
         thrust,
         state.resets,

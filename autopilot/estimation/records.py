@@ -262,6 +262,20 @@ class Clipping(NamedTuple):
     samples: float  # of the accelerometer that were cut so far
 
 
+class ImuHeight(NamedTuple):
+    """The height of the inertial unit above its assumed place, and sums of the fit of f to e: see
+    `autopilot.estimation.imu_height`."""
+
+    height: float  # m; 0 until it is known
+    correlation: float  # of f . e, m/s^4
+    square: float  # of e . e, 1/s^4
+    spread: float  # of the square of what f . e differs by from the fit, m^2/s^8
+    mean_lateral: Vec3  # m/s^2, of f
+    rest_lateral: Vec3  # m/s^2, mean of what f differs from its mean by
+    mean_turning: Vec3  # 1/s^2, of e
+    rest_turning: Vec3  # 1/s^2
+
+
 class Uncertainty(NamedTuple):
     """Standard deviations of the estimate, as of the last prediction."""
 
@@ -288,6 +302,7 @@ class EstimatorState(NamedTuple):
     clipping: Clipping
     missing_pull: float  # N, averaged over time: the cable's pull by the pendulum less the measured pull
     slack_pull: float  # N, the pull that would be measured with the assumed mass while the cable is slack
+    imu_height: ImuHeight
     frame_share: float  # of the air's force on the vehicle across the rotors' axis: see `cable_pull`
     last_thrust: float  # N, assumed at the last prediction
     resets: float
@@ -357,6 +372,7 @@ def blank_state() -> EstimatorState:
         clipping=Clipping(ZERO, 0.0, inf, 0.0),
         missing_pull=0.0,
         slack_pull=0.0,
+        imu_height=ImuHeight(0.0, 0.0, 0.0, 0.0, ZERO, ZERO, ZERO, ZERO),
         frame_share=UNKNOWN_FRAME_SHARE,
         last_thrust=0.0,
         resets=0.0,

@@ -1,0 +1,99 @@
+"""How far above its assumed place the inertial unit sits, learned in flight.
+
+| symbol | code name | frame | unit | |
+|---|---|---|---|---|
+| h | height | B | m | of the unit above its assumed place |
+| r | force | I | N | `cable_pull`: all that acts on the vehicle besides weight and thrust |
+| T q | | I | N | pull of the cable |
+| W, J, M | | B | | body rate, inertia, moment of rotors and cable |
+| f | lateral | B | m/s^2 | R^T (r - T q) / m_Q, of which only the part across the rotors' axis is used |
+| e | turning | B | 1/s^2 | what the unit measures of the rotation across this axis for each metre of h |
+
+The thrust has no part across the rotors' axis, so that
+
+    f = p + h e + noise,    e = (W'_y + W_x W_z, -W'_x + W_y W_z),    W' = J^-1 (M - W x J W),
+
+where the acceleration p by wind and drag changes slowly. h is the least-squares fit of f to e, after the mean
+over `MEAN_TIME_S` has been taken away from both, and that of the rest once more. W' is computed from the
+moment of the rotors, and so contains neither the gyroscope's noise nor the vibration of the frame, which both
+sensors measure.
+
+An unknown height below the centre of mass is dangerous where the law learns the push of the wind from the
+accelerometer: a vehicle that begins to tilt seems to be pushed the other way, and tilts further. A height
+that is assumed wrongly has the same effect. So of h only the part is assumed of which the fit is certain:
+`KNOWN_SIGMAS` deviations less, with the deviation of a fit whose residuals last for `CORRELATION_S`. In
+gusts, to which the law reacts by a rotation, the fit is 4 to 8 mm too low; less than `LEAST_HEIGHT` counts as
+none.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+from autopilot.estimation.records import EstimatorTuning, ImuHeight, LoadEstimate, VehicleEstimate
+from autopilot.estimation.tautness import MIN_FLOWN_HEIGHT
+from autopilot.geometry.kernel import kernel
+from autopilot.geometry.lanes import if_above
+from autopilot.geometry.linear import Vec3, add, apply_transposed, axpy, cross, scale, sub, times
+from autopilot.geometry.packed import with_field
+from autopilot.geometry.so3 import rotation_from_quat
+
+MEAN_TIME_S, MEMORY_S = 0.15, 20.0  # s, time constants of the means and of the sums
+KNOWN_SIGMAS, CORRELATION_S = 5.0, 0.02
+LEAST_HEIGHT, GREATEST_HEIGHT = 0.01, 0.3  # m
+_LEAST = 1e-9  # in place of a divisor that is still zero
+
+
+@kernel
+def with_imu_height(tuning: EstimatorTuning, height: float) -> EstimatorTuning:
+    """The tuning with an inertial unit that is higher by `height` (m)."""
+    if height == 0.0:
+        return tuning
+    return with_field(tuning, "imu_position", add(tuning.imu_position, (0.0, 0.0, height)))
+
+
+@kernel
+def _mean_and_rest(mean: Vec3, value: Vec3, share: float) -> tuple[Vec3, Vec3]:
+    """The fading mean after another value, and what the value differs from it by."""
+    mean = axpy(share, sub(value, mean), mean)
+    return mean, sub(value, mean)
+
+
+@kernel
+def learned_imu_height(
+    known: ImuHeight,
+    force: Vec3,
+    pull: float,
+    load: LoadEstimate,
+    vehicle: VehicleEstimate,
+    moment: Vec3,
+    tuning: EstimatorTuning,
+    dt: float,
+) -> ImuHeight:
+    """h after another sample. `force` (N, world) and `pull` (N) are by this sample, with the height known so
+    far, `moment` (N m, body) is that of rotors and cable. On the ground, whose force is not known, nothing is
+    learned."""
+    W, J = vehicle.omega_body, tuning.inertia
+    torque = sub(moment, cross(W, times(J, W)))
+    turning: Vec3 = (torque[1] / J[1] + W[0] * W[2], W[1] * W[2] - torque[0] / J[0], 0.0)
+    without_cable = axpy(-pull if load.taut > 0.0 else 0.0, load.q_cable, force)
+    lateral = apply_transposed(rotation_from_quat(vehicle.quat_wxyz), without_cable)
+    lateral = axpy(known.height, turning, scale(1.0 / tuning.quad_mass, lateral))
+    # the means begin with the first values in the air
+    above_load = vehicle.x_quad[2] - load.x_load[2]
+    share = if_above(above_load, MIN_FLOWN_HEIGHT * tuning.cable_length, dt / (MEAN_TIME_S + dt), 1.0)
+    mean_lateral, f = _mean_and_rest(known.mean_lateral, lateral, share)
+    rest_lateral, f = _mean_and_rest(known.rest_lateral, f, share)
+    mean_turning, e = _mean_and_rest(known.mean_turning, turning, share)
+    rest_turning, e = _mean_and_rest(known.rest_turning, e, share)
+    product, size = f[0] * e[0] + f[1] * e[1], e[0] * e[0] + e[1] * e[1]
+    kept = 1.0 - dt / MEMORY_S
+    correlation, square = kept * known.correlation + product, kept * known.square + size
+    residual = product - known.correlation / max(known.square, _LEAST) * size
+    spread = kept * known.spread + residual * residual
+    fitted = correlation / max(square, _LEAST)
+    margin = KNOWN_SIGMAS * sqrt(spread * CORRELATION_S / max(dt, _LEAST)) / max(square, _LEAST)
+    certain = max(0.0, fitted - margin) + min(0.0, fitted + margin)
+    height = if_above(abs(certain), LEAST_HEIGHT, min(GREATEST_HEIGHT, max(-GREATEST_HEIGHT, certain)), 0.0)
+    means = mean_lateral, rest_lateral, mean_turning, rest_turning
+    return ImuHeight(height, correlation, square, spread, *means)
