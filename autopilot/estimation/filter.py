@@ -12,7 +12,6 @@ from math import isfinite, isinf, radians, sqrt
 
 from autopilot.control.drag import Drag
 from autopilot.control.records import Cable, State
-from autopilot.estimation.imu_height import with_imu_height
 from autopilot.estimation.inbox import (
     DIRECTION,
     FIELD,
@@ -166,7 +165,6 @@ def estimate(
     """
     state = with_length_change(state, length_change)
     tuning = with_learned_mass(with_field(tuning, "cable_length", cable.length), state.slack_pull)
-    tuning = with_imu_height(tuning, state.imu_height.height)
     reeling, along = cable.rate != 0.0 and state.load.taut != 0.0, state.load.q_cable
     if isinf(cable.length):
         state = release_load(state, history, tuning)

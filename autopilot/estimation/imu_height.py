@@ -30,33 +30,37 @@ from __future__ import annotations
 
 from math import sqrt
 
+from autopilot.estimation.cable_pull import MIN_CARRYING_SHARE
 from autopilot.estimation.records import EstimatorTuning, ImuHeight, LoadEstimate, VehicleEstimate
 from autopilot.estimation.tautness import MIN_FLOWN_HEIGHT
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.lanes import if_above
-from autopilot.geometry.linear import Vec3, add, apply_transposed, axpy, cross, scale, sub, times
-from autopilot.geometry.packed import with_field
+from autopilot.geometry.linear import Vec3, axpy, column, cross, dot, sub, times
 from autopilot.geometry.so3 import rotation_from_quat
 
 MEAN_TIME_S, MEMORY_S = 0.15, 20.0  # s, time constants of the means and of the sums
 KNOWN_SIGMAS, CORRELATION_S = 5.0, 0.02
 LEAST_HEIGHT, GREATEST_HEIGHT = 0.01, 0.3  # m
+Pair = tuple[float, float]
 _LEAST = 1e-9  # in place of a divisor that is still zero
 
 
 @kernel
-def with_imu_height(tuning: EstimatorTuning, height: float) -> EstimatorTuning:
-    """The tuning with an inertial unit that is higher by `height` (m)."""
-    if height == 0.0:
-        return tuning
-    return with_field(tuning, "imu_position", add(tuning.imu_position, (0.0, 0.0, height)))
+def height_accel(rate: Vec3, rate_dot: Vec3, height: float) -> Vec3:
+    """What a unit at this height (m) measures of a rotation by `rate` (rad/s) more than one at the centre of
+    mass: W' x h + W x (W x h), m/s^2, body."""
+    return (
+        height * (rate_dot[1] + rate[0] * rate[2]),
+        height * (rate[1] * rate[2] - rate_dot[0]),
+        -height * (rate[0] * rate[0] + rate[1] * rate[1]),
+    )
 
 
 @kernel
-def _mean_and_rest(mean: Vec3, value: Vec3, share: float) -> tuple[Vec3, Vec3]:
+def _mean_and_rest(mean: Pair, value: Pair, share: float) -> tuple[Pair, Pair]:
     """The fading mean after another value, and what the value differs from it by."""
-    mean = axpy(share, sub(value, mean), mean)
-    return mean, sub(value, mean)
+    mean = (mean[0] + share * (value[0] - mean[0]), mean[1] + share * (value[1] - mean[1]))
+    return mean, (value[0] - mean[0], value[1] - mean[1])
 
 
 @kernel
@@ -66,25 +70,31 @@ def learned_imu_height(
     pull: float,
     load: LoadEstimate,
     vehicle: VehicleEstimate,
+    thrust: float,
     moment: Vec3,
     tuning: EstimatorTuning,
     dt: float,
 ) -> ImuHeight:
     """h after another sample. `force` (N, world) and `pull` (N) are by this sample, with the height known so
-    far, `moment` (N m, body) is that of rotors and cable. On the ground, whose force is not known, nothing is
-    learned."""
+    far, `thrust` (N) is that of the rotors, `moment` (N m, body) that of rotors and cable. Nothing is learned
+    on the ground, whose force is not known, nor while the rotors do not carry the vehicle."""
     W, J = vehicle.omega_body, tuning.inertia
     torque = sub(moment, cross(W, times(J, W)))
-    turning: Vec3 = (torque[1] / J[1] + W[0] * W[2], W[1] * W[2] - torque[0] / J[0], 0.0)
+    turning = height_accel(W, (torque[0] / J[0], torque[1] / J[1], 0.0), 1.0)
     without_cable = axpy(-pull if load.taut > 0.0 else 0.0, load.q_cable, force)
-    lateral = apply_transposed(rotation_from_quat(vehicle.quat_wxyz), without_cable)
-    lateral = axpy(known.height, turning, scale(1.0 / tuning.quad_mass, lateral))
+    R = rotation_from_quat(vehicle.quat_wxyz)
+    lateral = (
+        dot(column(R, 0), without_cable) / tuning.quad_mass + known.height * turning[0],
+        dot(column(R, 1), without_cable) / tuning.quad_mass + known.height * turning[1],
+    )
     # the means begin with the first values in the air
     above_load = vehicle.x_quad[2] - load.x_load[2]
+    carried = MIN_CARRYING_SHARE * tuning.quad_mass * tuning.gravity
     share = if_above(above_load, MIN_FLOWN_HEIGHT * tuning.cable_length, dt / (MEAN_TIME_S + dt), 1.0)
+    share = if_above(thrust, carried, share, 1.0)
     mean_lateral, f = _mean_and_rest(known.mean_lateral, lateral, share)
     rest_lateral, f = _mean_and_rest(known.rest_lateral, f, share)
-    mean_turning, e = _mean_and_rest(known.mean_turning, turning, share)
+    mean_turning, e = _mean_and_rest(known.mean_turning, (turning[0], turning[1]), share)
     rest_turning, e = _mean_and_rest(known.rest_turning, e, share)
     product, size = f[0] * e[0] + f[1] * e[1], e[0] * e[0] + e[1] * e[1]
     kept = 1.0 - dt / MEMORY_S

@@ -24,7 +24,7 @@ from autopilot.estimation.cable_pull import (
 from autopilot.estimation.clipping import add_impact_noise, update_clipping
 from autopilot.estimation.covariance import PropagationInputs, propagate_covariance
 from autopilot.estimation.history import store_state
-from autopilot.estimation.imu_height import learned_imu_height
+from autopilot.estimation.imu_height import height_accel, learned_imu_height
 from autopilot.estimation.records import (
     AIDED_SIZE,
     ATTITUDE,
@@ -86,6 +86,8 @@ SPEED_ERROR_TIME_S = 1.0  # for which an error of the vehicle's velocity lasts
 # A load on the ground that is estimated farther from the vehicle than this share of its cable, and this many
 # deviations, is dragged along; how far beside it is not known where the vehicle is nearly as high (share)
 DRAGGING_SHARE, DRAGGING_SIGMAS, MIN_DRAGGING_SHARE = 1.05, 3.0, 0.3
+LEARNING_STEPS = 4  # after which the place of the inertial unit is learned from one more sample
+LEAST_STEP = 1e-9  # s, in place of a step of no duration
 LOAD_ON_GROUND_WALK = 0.01  # m per square root of a second, of a load that stays where it is on the ground
 
 
@@ -132,13 +134,18 @@ def predict_vehicle(
     last: ImuReading,
     moment: Vec3,
     gyro_var: float,
+    imu_height: float,
     tuning: EstimatorTuning,
     dt: float,
 ) -> tuple[VehicleEstimate, Mat3]:
     """Strapdown integration by the trapezoidal rule over the last two samples; also R at half a step."""
     gyro = sub(_mean(imu.gyro, last.gyro), vehicle.gyro_bias)
     omega = filtered_body_rate(vehicle, imu.gyro, moment, gyro_var, tuning, dt)
-    turning = turning_accel(gyro, sub(omega, vehicle.omega_body), tuning.imu_position, dt)
+    change = sub(omega, vehicle.omega_body)
+    turning = add(
+        turning_accel(gyro, change, tuning.imu_position, dt),
+        height_accel(gyro, scale(1.0 / max(dt, LEAST_STEP), change), imu_height),
+    )
     accel = sub(sub(_mean(imu.accel, last.accel), vehicle.accel_bias), turning)
     R = rotation_from_quat(quat_multiply(vehicle.quat_wxyz, quat_exp(scale(0.5 * dt, gyro))))
     force = apply(R, accel)  # specific force, ENU
@@ -327,7 +334,9 @@ def predict(
     clipping = update_clipping(state.clipping, state.vibration, imu, state.last_imu, tuning, dt)
     if clipping.gyro > 0.0:
         gyro_var = max(gyro_var, tuning.gyro_range * tuning.gyro_range)
-    vehicle, R = predict_vehicle(state.vehicle, imu, state.last_imu, moment, gyro_var, tuning, dt)
+    vehicle, R = predict_vehicle(
+        state.vehicle, imu, state.last_imu, moment, gyro_var, state.imu_height.height, tuning, dt
+    )
     a = vehicle.accel_quad
     cable_accel_std, separation_std = pendulum_error(state, history, tuning)
     inputs = PropagationInputs(
@@ -375,6 +384,12 @@ def predict(
     add_snatch_uncertainty(load, state.load.pull, history, tuning)
     if is_pull_known(load, vehicle, history, state.missing_pull, tuning):
         frame_share = learned_frame_share(force, load, vehicle, frame_share, tuning, dt)
+    imu_height = state.imu_height
+    if state.head % LEARNING_STEPS == 0:
+        step = LEARNING_STEPS * dt
+        imu_height = learned_imu_height(
+            imu_height, force, measured, load, vehicle, thrust, moment, tuning, step
+        )
     predicted = EstimatorState(
         state.time_s + dt,
         vehicle,
@@ -400,7 +415,7 @@ def predict(
         clipping,
         averaged_missing_pull(load, vehicle, history, state.missing_pull, tuning, dt),
         averaged_slack_pull(state.slack_pull, measured, load, vehicle, R[2][2], history, tuning, dt),
-        learned_imu_height(state.imu_height, force, measured, load, vehicle, moment, tuning, dt),
+        imu_height,
         frame_share,
         thrust,
         state.resets,

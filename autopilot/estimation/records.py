@@ -270,10 +270,10 @@ class ImuHeight(NamedTuple):
     correlation: float  # of f . e, m/s^4
     square: float  # of e . e, 1/s^4
     spread: float  # of the square of what f . e differs by from the fit, m^2/s^8
-    mean_lateral: Vec3  # m/s^2, of f
-    rest_lateral: Vec3  # m/s^2, mean of what f differs from its mean by
-    mean_turning: Vec3  # 1/s^2, of e
-    rest_turning: Vec3  # 1/s^2
+    mean_lateral: tuple[float, float]  # m/s^2, of f
+    rest_lateral: tuple[float, float]  # m/s^2, mean of what f differs from its mean by
+    mean_turning: tuple[float, float]  # 1/s^2, of e
+    rest_turning: tuple[float, float]  # 1/s^2
 
 
 class Uncertainty(NamedTuple):
@@ -372,7 +372,7 @@ def blank_state() -> EstimatorState:
         clipping=Clipping(ZERO, 0.0, inf, 0.0),
         missing_pull=0.0,
         slack_pull=0.0,
-        imu_height=ImuHeight(0.0, 0.0, 0.0, 0.0, ZERO, ZERO, ZERO, ZERO),
+        imu_height=ImuHeight(0.0, 0.0, 0.0, 0.0, (0.0, 0.0), (0.0, 0.0), (0.0, 0.0), (0.0, 0.0)),
         frame_share=UNKNOWN_FRAME_SHARE,
         last_thrust=0.0,
         resets=0.0,

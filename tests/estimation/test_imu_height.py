@@ -9,8 +9,8 @@ from autopilot.estimation.imu_height import (
     GREATEST_HEIGHT,
     LEAST_HEIGHT,
     MEAN_TIME_S,
+    height_accel,
     learned_imu_height,
-    with_imu_height,
 )
 from autopilot.estimation.records import ImuHeight, blank_state
 from autopilot.geometry.lever_arm import arm_accel
@@ -31,6 +31,7 @@ def learned(
     accel_noise: float = 0.05,
     push_std: float = 0.0,
     turning_std: float = 3.0,
+    thrust: float = TUNING.quad_mass * TUNING.gravity,
 ) -> ImuHeight:
     """After `duration_s`, by a unit at `height` (m), whose reading is compensated with what is learned.
 
@@ -57,7 +58,7 @@ def learned(
         force = apply(rotation_from_quat(quat), scale(TUNING.quad_mass, tuple(accel)))
         if taut > 0.0:
             force = axpy(PULL_N, load.q_cable, force)
-        known = learned_imu_height(known, force, PULL_N, load, vehicle, moment, TUNING, DT)
+        known = learned_imu_height(known, force, PULL_N, load, vehicle, thrust, moment, TUNING, DT)
     return known
 
 
@@ -97,16 +98,16 @@ def test_what_would_be_a_disaster_is_learned_within_a_second() -> None:
 
 
 def test_nothing_is_learned_on_the_ground() -> None:
-    """It holds the vehicle, whatever its rotors do."""
-    known = learned(-0.05, above_load=0.1)
-    assert known.height == 0.0
-    assert known.square < 1e-20
+    """It holds the vehicle, whatever its rotors do; nor in the hand."""
+    for known in (learned(-0.05, above_load=0.1), learned(-0.05, thrust=0.0)):
+        assert known.height == 0.0
+        assert known.square < 1e-20
 
 
 def test_a_push_that_has_long_been_there_is_no_rotation() -> None:
     """The means begin with it, not at zero."""
     known = learned(0.0, 0.2 * MEAN_TIME_S, accel_noise=0.0)
-    assert np.hypot(*known.mean_lateral[:2]) == pytest.approx(np.hypot(0.5, 0.3), rel=0.2)
+    assert np.hypot(*known.mean_lateral) == pytest.approx(np.hypot(0.5, 0.3), rel=0.2)
     assert abs(known.correlation) < 1e-9
 
 
@@ -115,9 +116,8 @@ def test_the_height_has_a_limit() -> None:
     assert learned(-1.0).height == -GREATEST_HEIGHT
 
 
-def test_it_is_added_to_what_is_assumed() -> None:
-    """And changes nothing where it is zero."""
-    tuning = TUNING._replace(imu_position=(0.01, 0.02, 0.03))
-    assert with_imu_height(tuning, -0.05).imu_position == pytest.approx((0.01, 0.02, -0.02))
-    assert with_imu_height(tuning, 0.0).imu_position == tuning.imu_position
+def test_what_a_unit_at_a_height_measures() -> None:
+    """As any other point of the body."""
+    W, W_dot = (0.3, -0.5, 0.9), (2.0, -3.0, 0.7)
+    assert height_accel(W, W_dot, -0.05) == pytest.approx(arm_accel(W, W_dot, (0.0, 0.0, -0.05)))
     assert LEAST_HEIGHT < 0.02  # half of what endangers the vehicles that are shipped
