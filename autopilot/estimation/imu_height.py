@@ -35,7 +35,8 @@ from autopilot.estimation.records import EstimatorTuning, ImuHeight, LoadEstimat
 from autopilot.estimation.tautness import MIN_FLOWN_HEIGHT
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.lanes import if_above
-from autopilot.geometry.linear import Vec3, axpy, column, cross, dot, sub, times
+from autopilot.geometry.lever_arm import arm_accel
+from autopilot.geometry.linear import E3, Vec3, axpy, column, cross, dot, sub, times
 from autopilot.geometry.so3 import rotation_from_quat
 
 MEAN_TIME_S, MEMORY_S = 0.15, 20.0  # s, time constants of the means and of the sums
@@ -43,17 +44,6 @@ KNOWN_SIGMAS, CORRELATION_S = 5.0, 0.02
 LEAST_HEIGHT, GREATEST_HEIGHT = 0.01, 0.3  # m
 Pair = tuple[float, float]
 _LEAST = 1e-9  # in place of a divisor that is still zero
-
-
-@kernel
-def height_accel(rate: Vec3, rate_dot: Vec3, height: float) -> Vec3:
-    """What a unit at this height (m) measures of a rotation by `rate` (rad/s) more than one at the centre of
-    mass: W' x h + W x (W x h), m/s^2, body."""
-    return (
-        height * (rate_dot[1] + rate[0] * rate[2]),
-        height * (rate[1] * rate[2] - rate_dot[0]),
-        -height * (rate[0] * rate[0] + rate[1] * rate[1]),
-    )
 
 
 @kernel
@@ -80,7 +70,7 @@ def learned_imu_height(
     on the ground, whose force is not known, nor while the rotors do not carry the vehicle."""
     W, J = vehicle.omega_body, tuning.inertia
     torque = sub(moment, cross(W, times(J, W)))
-    turning = height_accel(W, (torque[0] / J[0], torque[1] / J[1], 0.0), 1.0)
+    turning = arm_accel(W, (torque[0] / J[0], torque[1] / J[1], torque[2] / J[2]), E3)
     without_cable = axpy(-pull if load.taut > 0.0 else 0.0, load.q_cable, force)
     R = rotation_from_quat(vehicle.quat_wxyz)
     lateral = (
@@ -101,8 +91,9 @@ def learned_imu_height(
     correlation, square = kept * known.correlation + product, kept * known.square + size
     residual = product - known.correlation / max(known.square, _LEAST) * size
     spread = kept * known.spread + residual * residual
-    fitted = correlation / max(square, _LEAST)
-    margin = KNOWN_SIGMAS * sqrt(spread * CORRELATION_S / max(dt, _LEAST)) / max(square, _LEAST)
+    divisor = max(square, _LEAST)
+    fitted = correlation / divisor
+    margin = KNOWN_SIGMAS * sqrt(spread * CORRELATION_S / max(dt, _LEAST)) / divisor
     certain = max(0.0, fitted - margin) + min(0.0, fitted + margin)
     height = if_above(abs(certain), LEAST_HEIGHT, min(GREATEST_HEIGHT, max(-GREATEST_HEIGHT, certain)), 0.0)
     means = mean_lateral, rest_lateral, mean_turning, rest_turning

@@ -24,7 +24,7 @@ from autopilot.estimation.cable_pull import (
 from autopilot.estimation.clipping import add_impact_noise, update_clipping
 from autopilot.estimation.covariance import PropagationInputs, propagate_covariance
 from autopilot.estimation.history import store_state
-from autopilot.estimation.imu_height import height_accel, learned_imu_height
+from autopilot.estimation.imu_height import learned_imu_height
 from autopilot.estimation.records import (
     AIDED_SIZE,
     ATTITUDE,
@@ -58,7 +58,6 @@ from autopilot.estimation.tautness import (
 from autopilot.estimation.vibration import accel_noise, gyro_noise, update_vibration
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import (
-    ZERO,
     Mat3,
     Vec3,
     add,
@@ -66,7 +65,6 @@ from autopilot.geometry.linear import (
     axpy,
     cross,
     dot,
-    is_zero,
     norm,
     scale,
     sub,
@@ -122,9 +120,8 @@ def filtered_body_rate(
 def turning_accel(rate: Vec3, change: Vec3, position: Vec3, dt: float) -> Vec3:
     """What an accelerometer at a `position` (m, from the centre of mass, body) measures of a rotation by
     `rate` (rad/s), which has changed by `change` in dt seconds: W' x r + W x (W x r), m/s^2, body."""
-    if not dt > 0.0 or is_zero(position):
-        return ZERO
-    return axpy(1.0 / dt, cross(change, position), cross(rate, cross(rate, position)))
+    per_second = 1.0 / max(dt, LEAST_STEP)
+    return axpy(per_second, cross(change, position), cross(rate, cross(rate, position)))
 
 
 @kernel
@@ -141,11 +138,8 @@ def predict_vehicle(
     """Strapdown integration by the trapezoidal rule over the last two samples; also R at half a step."""
     gyro = sub(_mean(imu.gyro, last.gyro), vehicle.gyro_bias)
     omega = filtered_body_rate(vehicle, imu.gyro, moment, gyro_var, tuning, dt)
-    change = sub(omega, vehicle.omega_body)
-    turning = add(
-        turning_accel(gyro, change, tuning.imu_position, dt),
-        height_accel(gyro, scale(1.0 / max(dt, LEAST_STEP), change), imu_height),
-    )
+    position = add(tuning.imu_position, (0.0, 0.0, imu_height))
+    turning = turning_accel(gyro, sub(omega, vehicle.omega_body), position, dt)
     accel = sub(sub(_mean(imu.accel, last.accel), vehicle.accel_bias), turning)
     R = rotation_from_quat(quat_multiply(vehicle.quat_wxyz, quat_exp(scale(0.5 * dt, gyro))))
     force = apply(R, accel)  # specific force, ENU

@@ -9,9 +9,9 @@ from autopilot.estimation.imu_height import (
     GREATEST_HEIGHT,
     LEAST_HEIGHT,
     MEAN_TIME_S,
-    height_accel,
     learned_imu_height,
 )
+from autopilot.estimation.predict import turning_accel
 from autopilot.estimation.records import ImuHeight, blank_state
 from autopilot.geometry.lever_arm import arm_accel
 from autopilot.geometry.linear import Vec3, add, apply, axpy, cross, scale, times
@@ -119,5 +119,6 @@ def test_the_height_has_a_limit() -> None:
 def test_what_a_unit_at_a_height_measures() -> None:
     """As any other point of the body."""
     W, W_dot = (0.3, -0.5, 0.9), (2.0, -3.0, 0.7)
-    assert height_accel(W, W_dot, -0.05) == pytest.approx(arm_accel(W, W_dot, (0.0, 0.0, -0.05)))
+    change, place = scale(DT, W_dot), (0.0, 0.0, -0.05)
+    assert turning_accel(W, change, place, DT) == pytest.approx(arm_accel(W, W_dot, place))
     assert LEAST_HEIGHT < 0.02  # half of what endangers the vehicles that are shipped
