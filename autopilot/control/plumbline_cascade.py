@@ -68,6 +68,7 @@ from autopilot.geometry.linear import (
     sub,
     times,
 )
+from autopilot.geometry.rigid_body import angular_accel
 from autopilot.geometry.s2 import normalise, tangent, unit_derivatives
 from autopilot.geometry.so3 import exp
 from autopilot.vehicle.rotors import MAX_TURN_RATE
@@ -221,8 +222,8 @@ def shifted_jet(jet: Jet, h: float) -> Jet:
 
 
 @kernel
-def shifted_state(state: State, motion: LoadMotion, angular_accel: Vec3, h: float, vehicle: Vehicle) -> State:
-    """The state h seconds later along the motion of the model; `angular_accel` is Omega', rad/s^2, body."""
+def shifted_state(state: State, motion: LoadMotion, omega_dot: Vec3, h: float, vehicle: Vehicle) -> State:
+    """The state h seconds later along the motion of the model; `omega_dot` is Omega', rad/s^2, body."""
     h2 = 0.5 * h * h
     q = normalise(add3(state.q_cable, scale(h, state.q_cable_dot), scale(h2, motion.q_ddot)))
     q_dot = add3(state.q_cable_dot, scale(h, motion.q_ddot), scale(h2, motion.q_dddot))
@@ -236,8 +237,8 @@ def shifted_state(state: State, motion: LoadMotion, angular_accel: Vec3, h: floa
         q_dot,
         add(state.x_quad, sub(sub(x, state.x_load), scale(L, sub(q, state.q_cable)))),
         add(state.v_quad, sub(sub(v, state.v_load), scale(L, sub(q_dot, state.q_cable_dot)))),
-        mul(state.R, exp(add(scale(h, state.omega_body), scale(h2, angular_accel)))),
-        axpy(h, angular_accel, state.omega_body),
+        mul(state.R, exp(add(scale(h, state.omega_body), scale(h2, omega_dot)))),
+        axpy(h, omega_dot, state.omega_body),
         state.a_quad,
     )
 
@@ -289,7 +290,7 @@ def commanded_force(
 def shifted_force(
     state: State,
     motion: LoadMotion,
-    angular_accel: Vec3,
+    omega_dot: Vec3,
     f: float,
     f_dot: float,
     jet: Jet,
@@ -301,20 +302,12 @@ def shifted_force(
     vehicle: Vehicle,
 ) -> Vec3:
     """F, N, as it will be h seconds later, while the thrust f (N) changes by f' (N/s)."""
-    later = shifted_state(state, motion, angular_accel, h, vehicle)
+    later = shifted_state(state, motion, omega_dot, h, vehicle)
     air = add(drag_force(later.v_quad, drag), push)
     later_motion = load_motion(later, f + h * f_dot, f_dot, air, vehicle)
     e_x, e_v = sub(state.x_load, jet[0]), sub(state.v_load, jet[1])
     later_integral = add3(e_i, scale(h, e_x), scale(0.5 * h * h, e_v))
     return commanded_force(later, later_motion, air, shifted_jet(jet, h), later_integral, gains, vehicle).F
-
-
-@kernel
-def angular_acceleration(state: State, moment: Vec3, vehicle: Vehicle) -> Vec3:
-    """Omega', rad/s^2, body, under this moment (N m)."""
-    J, W = vehicle.inertia, state.omega_body
-    torque = sub(moment, cross(W, times(J, W)))
-    return (torque[0] / J[0], torque[1] / J[1], torque[2] / J[2])
 
 
 @kernel
@@ -391,11 +384,11 @@ def load_position(
     commanded = commanded_force(state, motion, air, jet, memory.integral, gains, vehicle)
     F, position, direction = commanded.F, commanded.position, commanded.direction
 
-    angular_accel = angular_acceleration(state, moment, vehicle)
+    omega_dot = angular_accel(state.omega_body, moment, vehicle.inertia)
     F_after = shifted_force(
         state,
         motion,
-        angular_accel,
+        omega_dot,
         thrust,
         memory.thrust_rate,
         jet,
@@ -409,7 +402,7 @@ def load_position(
     F_before = shifted_force(
         state,
         motion,
-        angular_accel,
+        omega_dot,
         thrust,
         memory.thrust_rate,
         jet,
@@ -478,10 +471,10 @@ def load_attitude(
     """
     air = add(drag_force(state.v_quad, drag), push)
     motion = load_motion(state, thrust, memory.thrust_rate, air, vehicle)
-    angular_accel = angular_acceleration(state, moment, vehicle)
+    omega_dot = angular_accel(state.omega_body, moment, vehicle.inertia)
     h = DIFFERENCE_STEP
-    after = shifted_state(state, motion, angular_accel, h, vehicle)
-    before = shifted_state(state, motion, angular_accel, -h, vehicle)
+    after = shifted_state(state, motion, omega_dot, h, vehicle)
+    before = shifted_state(state, motion, omega_dot, -h, vehicle)
     direction = held_direction(state, q_c, pull, gains, vehicle)
     F = direction.F
     F_dot, F_ddot = differences(

@@ -25,7 +25,6 @@ from autopilot.estimation.inbox import DIRECTION, FIX, HEIGHT, KIND, POSE, READI
 from autopilot.estimation.records import Array, DirectionReading, EstimatorState, GnssReading, PoseReading
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.lanes import if_above
-from autopilot.geometry.lever_arm import arm_velocity
 from autopilot.geometry.linear import (
     Vec3,
     add,
@@ -40,6 +39,7 @@ from autopilot.geometry.linear import (
     sub,
 )
 from autopilot.geometry.packed import pack, unpack, with_field
+from autopilot.geometry.rigid_body import arm_velocity
 from autopilot.geometry.so3 import rotation_from_quat
 
 

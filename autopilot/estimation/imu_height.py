@@ -35,8 +35,8 @@ from autopilot.estimation.records import EstimatorTuning, ImuHeight, LoadEstimat
 from autopilot.estimation.tautness import MIN_FLOWN_HEIGHT
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.lanes import if_above
-from autopilot.geometry.lever_arm import arm_accel
-from autopilot.geometry.linear import E3, Vec3, axpy, column, cross, dot, sub, times
+from autopilot.geometry.linear import E3, Vec3, axpy, column, dot
+from autopilot.geometry.rigid_body import angular_accel, arm_accel
 from autopilot.geometry.so3 import rotation_from_quat
 
 MEAN_TIME_S, MEMORY_S = 0.15, 20.0  # s, time constants of the means and of the sums
@@ -68,9 +68,8 @@ def learned_imu_height(
     """h after another sample. `force` (N, world) and `pull` (N) are by this sample, with the height known so
     far, `thrust` (N) is that of the rotors, `moment` (N m, body) that of rotors and cable. Nothing is learned
     on the ground, whose force is not known, nor while the rotors do not carry the vehicle."""
-    W, J = vehicle.omega_body, tuning.inertia
-    torque = sub(moment, cross(W, times(J, W)))
-    turning = arm_accel(W, (torque[0] / J[0], torque[1] / J[1], torque[2] / J[2]), E3)
+    W = vehicle.omega_body
+    turning = arm_accel(W, angular_accel(W, moment, tuning.inertia), E3)
     without_cable = axpy(-pull if load.taut > 0.0 else 0.0, load.q_cable, force)
     R = rotation_from_quat(vehicle.quat_wxyz)
     lateral = (

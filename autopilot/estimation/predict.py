@@ -68,8 +68,8 @@ from autopilot.geometry.linear import (
     norm,
     scale,
     sub,
-    times,
 )
+from autopilot.geometry.rigid_body import angular_accel
 from autopilot.geometry.s2 import normalise, tangent
 from autopilot.geometry.so3 import quat_exp, quat_multiply, quat_normalise, rotation_from_quat
 
@@ -107,9 +107,8 @@ def filtered_body_rate(
 ) -> Vec3:
     """Body rate (rad/s): propagated by the rotors' moment (N m), and corrected by the gyroscope as far as its
     noise is small beside the error of this propagation."""
-    W, J = vehicle.omega_body, tuning.inertia
-    torque = sub(moment, cross(W, times(J, W)))
-    predicted = axpy(dt, (torque[0] / J[0], torque[1] / J[1], torque[2] / J[2]), W)
+    W = vehicle.omega_body
+    predicted = axpy(dt, angular_accel(W, moment, tuning.inertia), W)
     model_std = tuning.turn_std * dt
     ratio = model_std * model_std / gyro_var
     share = 0.5 * (sqrt(ratio * ratio + 4.0 * ratio) - ratio)

@@ -8,15 +8,15 @@
 | n | | body, m | rho x q_b, so that the pull T q exerts the moment T n on the vehicle |
 | mu | effective_mass | kg | 1 / mu = 1/m_L + 1/m_Q + n . J^-1 n |
 
-`autopilot.geometry.lever_arm` has x_A' and x_A''. With rho = 0 nothing here is added: the equations are, to
+`autopilot.geometry.rigid_body` has x_A' and x_A''. With rho = 0 nothing here is added: the equations are, to
 the bit, those of a cable at the centre of mass.
 """
 
 from __future__ import annotations
 
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.lever_arm import arm_accel, arm_velocity
 from autopilot.geometry.linear import Mat3, Vec3, add, apply, apply_transposed, cross, dot, is_zero, sub
+from autopilot.geometry.rigid_body import arm_accel, arm_velocity
 from autopilot.geometry.so3 import rotation_from_quat
 from sitl.plant.records import Motion, Truth
 

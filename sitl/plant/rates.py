@@ -42,8 +42,8 @@ from autopilot.geometry.linear import (
     norm,
     scale,
     sub,
-    times,
 )
+from autopilot.geometry.rigid_body import angular_accel
 from autopilot.geometry.so3 import quat_derivative, quat_normalise, rotation_from_quat
 from sitl.plant.air import has_rotor_air_effects, rotor_air_wrench
 from sitl.plant.attachment import (
@@ -113,10 +113,8 @@ def rates(
     a_quad = scale(1.0 / truth.quad_mass, a_quad)
     a_load = scale(1.0 / truth.load_mass, a_load)
 
-    J = truth.inertia
     moment = axpy(-truth.spin_drag * norm(Omega), Omega, add(moment, ground_moment))
-    moment = sub(moment, cross(Omega, times(J, Omega)))
-    alpha = inverse_inertia_times(moment, truth)
+    alpha = angular_accel(Omega, moment, truth.inertia)
 
     tension = 0.0
     a_separation = sub(a_load, a_quad)  # without gravity, which is the same for both

@@ -13,8 +13,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.lever_arm import arm_velocity
 from autopilot.geometry.linear import ZERO, Vec3, add, add3, apply, is_zero, scale, times
+from autopilot.geometry.rigid_body import arm_velocity
 from autopilot.geometry.so3 import rotation_from_quat
 from sitl.plant.records import PlantState
 from sitl.sensors.elementary import logarithm

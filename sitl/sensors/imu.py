@@ -14,7 +14,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.lever_arm import arm_accel
 from autopilot.geometry.linear import (
     IDENTITY,
     ZERO,
@@ -28,6 +27,7 @@ from autopilot.geometry.linear import (
     is_zero,
     scale,
 )
+from autopilot.geometry.rigid_body import arm_accel
 from autopilot.geometry.so3 import quat_exp, rotation_from_quat
 from sitl.plant.records import PlantState
 from sitl.sensors.noise import Drift, Noise, drift_start, drift_step, white

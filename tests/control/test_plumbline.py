@@ -1228,10 +1228,6 @@ HARMLESS = {
     f"{plumbline.__name__}: differences: sub(add(F_after, F_before), scale(2.0, F)) [1]": "along F",
     f"{plumbline.__name__}: differences: scale(2.0, F) [0]": "along F, where F'' turns nothing",
     **{
-        f"{plumbline.__name__}: angular_acceleration: {term}": "Omega' hardly moves F''"
-        for term in ("sub(moment, cross(W, times(J, W))) [1]", "cross(W, times(J, W)) [0]")
-    },
-    **{
         f"{plumbline.__name__}: {where}: vehicle.rotor_max - vehicle.rotor_min [right]": "least force 0"
         for where in ("max_level_moment", "commanded_thrust_rate")
     },

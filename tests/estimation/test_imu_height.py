@@ -13,8 +13,8 @@ from autopilot.estimation.imu_height import (
 )
 from autopilot.estimation.predict import turning_accel
 from autopilot.estimation.records import ImuHeight, blank_state
-from autopilot.geometry.lever_arm import arm_accel
 from autopilot.geometry.linear import Vec3, add, apply, axpy, cross, scale, times
+from autopilot.geometry.rigid_body import arm_accel
 from autopilot.geometry.so3 import quat_exp, rotation_from_quat
 from tests.doubles.motion import bebop_tuning
 

@@ -21,7 +21,8 @@ from autopilot.control.actuators.rotor_model import Actuation, ActuationConstant
 from autopilot.control.drag import Drag, drag_force
 from autopilot.control.records import State, Vehicle
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.linear import Vec3, add, axpy, column, cross, dot, scale, sub, times
+from autopilot.geometry.linear import Vec3, add, axpy, column, dot, scale, sub
+from autopilot.geometry.rigid_body import angular_accel
 from autopilot.geometry.s2 import normalise, tangent
 from autopilot.geometry.so3 import (
     Quat,
@@ -76,7 +77,7 @@ def _rates(
     vehicle: Vehicle,
 ) -> _Motion:
     """Time derivative of the motion, as in `load_motion`; the cable does not push."""
-    J, q = vehicle.inertia, m.q
+    q = m.q
     v_quad = axpy(-vehicle.cable_length, m.q_dot, m.v) if taut > 0.0 else m.v
     b3 = column(rotation_from_quat(m.quat), 2)
     F = axpy(thrust, b3, add(drag_force(v_quad, drag), push))
@@ -92,14 +93,13 @@ def _rates(
     else:
         a = scale(1.0 / vehicle.quad_mass, F)
         q_ddot = (0.0, 0.0, 0.0)
-    turning = sub(add(moment, torque), cross(m.omega, times(J, m.omega)))
     return _Motion(
         m.v,
         (a[0], a[1], a[2] - vehicle.gravity),
         m.q_dot,
         q_ddot,
         quat_derivative(m.quat, m.omega),
-        (turning[0] / J[0], turning[1] / J[1], turning[2] / J[2]),
+        angular_accel(m.omega, add(moment, torque), vehicle.inertia),
     )
 
 
