@@ -67,7 +67,8 @@ def learned_imu_height(
 ) -> ImuHeight:
     """h after another sample. `force` (N, world) and `pull` (N) are by this sample, with the height known so
     far, `thrust` (N) is that of the rotors, `moment` (N m, body) that of rotors and cable. Nothing is learned
-    on the ground, whose force is not known, nor while the rotors do not carry the vehicle."""
+    nor forgotten on the ground, whose force is not known, while the rotors do not carry the vehicle, and
+    without a load (its cable is infinitely long)."""
     W = vehicle.omega_body
     turning = arm_accel(W, angular_accel(W, moment, tuning.inertia), E3)
     without_cable = axpy(-pull if load.taut > 0.0 else 0.0, load.q_cable, force)
@@ -86,7 +87,7 @@ def learned_imu_height(
     mean_turning, e = _mean_and_rest(known.mean_turning, (turning[0], turning[1]), share)
     rest_turning, e = _mean_and_rest(known.rest_turning, e, share)
     product, size = f[0] * e[0] + f[1] * e[1], e[0] * e[0] + e[1] * e[1]
-    kept = 1.0 - dt / MEMORY_S
+    kept = if_above(1.0, share, 1.0 - dt / MEMORY_S, 1.0)
     correlation, square = kept * known.correlation + product, kept * known.square + size
     residual = product - known.correlation / max(known.square, _LEAST) * size
     spread = kept * known.spread + residual * residual

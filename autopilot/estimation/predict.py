@@ -69,7 +69,7 @@ from autopilot.geometry.linear import (
     scale,
     sub,
 )
-from autopilot.geometry.rigid_body import angular_accel
+from autopilot.geometry.rigid_body import angular_accel, arm_accel
 from autopilot.geometry.s2 import normalise, tangent
 from autopilot.geometry.so3 import quat_exp, quat_multiply, quat_normalise, rotation_from_quat
 
@@ -90,10 +90,10 @@ LOAD_ON_GROUND_WALK = 0.01  # m per square root of a second, of a load that stay
 
 
 @kernel
-def propagate_covariance2(cov: Covariance2, dt: float, rate_std: float) -> Covariance2:
-    """Covariance of (value, rate) after dt with white noise of `rate_std` dt on the rate."""
+def propagate_covariance2(cov: Covariance2, dt: float, accel_std: float) -> Covariance2:
+    """Covariance of (value, rate) after dt with white noise of `accel_std` dt on the rate."""
     aa, ab, bb = cov
-    return (aa + 2.0 * dt * ab + dt * dt * bb, ab + dt * bb, bb + rate_std * rate_std * dt * dt)
+    return (aa + 2.0 * dt * ab + dt * dt * bb, ab + dt * bb, bb + accel_std * accel_std * dt * dt)
 
 
 @kernel
@@ -116,14 +116,6 @@ def filtered_body_rate(
 
 
 @kernel
-def turning_accel(rate: Vec3, change: Vec3, position: Vec3, dt: float) -> Vec3:
-    """What an accelerometer at a `position` (m, from the centre of mass, body) measures of a rotation by
-    `rate` (rad/s), which has changed by `change` in dt seconds: W' x r + W x (W x r), m/s^2, body."""
-    per_second = 1.0 / max(dt, LEAST_STEP)
-    return axpy(per_second, cross(change, position), cross(rate, cross(rate, position)))
-
-
-@kernel
 def predict_vehicle(
     vehicle: VehicleEstimate,
     imu: ImuReading,
@@ -138,7 +130,8 @@ def predict_vehicle(
     gyro = sub(_mean(imu.gyro, last.gyro), vehicle.gyro_bias)
     omega = filtered_body_rate(vehicle, imu.gyro, moment, gyro_var, tuning, dt)
     position = add(tuning.imu_position, (0.0, 0.0, imu_height))
-    turning = turning_accel(gyro, sub(omega, vehicle.omega_body), position, dt)
+    omega_dot = scale(1.0 / max(dt, LEAST_STEP), sub(omega, vehicle.omega_body))
+    turning = arm_accel(gyro, omega_dot, position)
     accel = sub(sub(_mean(imu.accel, last.accel), vehicle.accel_bias), turning)
     R = rotation_from_quat(quat_multiply(vehicle.quat_wxyz, quat_exp(scale(0.5 * dt, gyro))))
     force = apply(R, accel)  # specific force, ENU

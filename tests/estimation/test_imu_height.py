@@ -7,11 +7,10 @@ import pytest
 
 from autopilot.estimation.imu_height import (
     GREATEST_HEIGHT,
-    LEAST_HEIGHT,
     MEAN_TIME_S,
+    MEMORY_S,
     learned_imu_height,
 )
-from autopilot.estimation.predict import turning_accel
 from autopilot.estimation.records import ImuHeight, blank_state
 from autopilot.geometry.linear import Vec3, add, apply, axpy, cross, scale, times
 from autopilot.geometry.rigid_body import arm_accel
@@ -28,6 +27,8 @@ def learned(
     duration_s: float = 6.0,
     above_load: float = 1.0,
     taut: float = 1.0,
+    cable_length: float = TUNING.cable_length,
+    known: ImuHeight = UNKNOWN,
     accel_noise: float = 0.05,
     push_std: float = 0.0,
     turning_std: float = 3.0,
@@ -36,10 +37,11 @@ def learned(
     """After `duration_s`, by a unit at `height` (m), whose reading is compensated with what is learned.
 
     The vehicle oscillates about two axes of its body, with accelerations of `turning_std` (rad/s^2), and is
-    pushed by wind and a gust (`push_std`, m/s^2) that lasts for about 0.5 s. At first it stands.
+    pushed by wind and a gust (`push_std`, m/s^2) that lasts for about 0.5 s. At first it stands, and has
+    `known` from a flight before.
     """
     noise = np.random.default_rng(7)
-    known, push = UNKNOWN, np.zeros(2)
+    push, tuning = np.zeros(2), TUNING._replace(cable_length=cable_length)
     load = blank_state().load._replace(taut=taut, q_cable=(0.3, -0.1, -np.sqrt(0.9)))
     frequency, J = 2.0 * np.pi * ROTATION_HZ, TUNING.inertia
     for k in range(round(duration_s / DT)):
@@ -58,7 +60,7 @@ def learned(
         force = apply(rotation_from_quat(quat), scale(TUNING.quad_mass, tuple(accel)))
         if taut > 0.0:
             force = axpy(PULL_N, load.q_cable, force)
-        known = learned_imu_height(known, force, PULL_N, load, vehicle, thrust, moment, TUNING, DT)
+        known = learned_imu_height(known, force, PULL_N, load, vehicle, thrust, moment, tuning, DT)
     return known
 
 
@@ -97,11 +99,28 @@ def test_what_would_be_a_disaster_is_learned_within_a_second() -> None:
     assert learned(-0.1, 0.7, turning_std=10.0).height < -0.05
 
 
-def test_nothing_is_learned_on_the_ground() -> None:
-    """It holds the vehicle, whatever its rotors do; nor in the hand."""
-    for known in (learned(-0.05, above_load=0.1), learned(-0.05, thrust=0.0)):
-        assert known.height == 0.0
-        assert known.square < 1e-20
+WHERE_NOTHING_IS_LEARNED = pytest.mark.parametrize(
+    "there",
+    [
+        pytest.param({"above_load": 0.1}, id="on the ground"),  # it holds the vehicle, whatever the rotors do
+        pytest.param({"thrust": 0.0}, id="in the hand"),
+        pytest.param({"cable_length": np.inf}, id="without a load"),
+    ],
+)
+
+
+@WHERE_NOTHING_IS_LEARNED
+def test_nothing_is_learned(there: dict[str, float]) -> None:
+    known = learned(-0.05, **there)
+    assert known.height == 0.0
+    assert known.square < 1e-20
+
+
+@WHERE_NOTHING_IS_LEARNED
+def test_nothing_is_forgotten(there: dict[str, float]) -> None:
+    """Not even in five memories of the fit."""
+    before = learned(-0.05)
+    assert learned(-0.05, 5.0 * MEMORY_S, known=before, **there)[:4] == before[:4]
 
 
 def test_a_push_that_has_long_been_there_is_no_rotation() -> None:
@@ -114,11 +133,3 @@ def test_a_push_that_has_long_been_there_is_no_rotation() -> None:
 def test_the_height_has_a_limit() -> None:
     """Nobody mounts it farther away."""
     assert learned(-1.0).height == -GREATEST_HEIGHT
-
-
-def test_what_a_unit_at_a_height_measures() -> None:
-    """As any other point of the body."""
-    W, W_dot = (0.3, -0.5, 0.9), (2.0, -3.0, 0.7)
-    change, place = scale(DT, W_dot), (0.0, 0.0, -0.05)
-    assert turning_accel(W, change, place, DT) == pytest.approx(arm_accel(W, W_dot, place))
-    assert LEAST_HEIGHT < 0.02  # half of what endangers the vehicles that are shipped
