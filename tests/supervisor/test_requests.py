@@ -28,6 +28,7 @@ from autopilot.supervisor.state import (
     Phase,
     is_landing,
 )
+from autopilot.trajectory.prepare import PENDING
 from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.parameters import autopilot_parameters
 from autopilot.wire.dialect import plumbline as mavlink
@@ -152,7 +153,11 @@ def test_every_request_is_asked() -> None:
     assert {type(request) for request in REQUESTS} == set(get_args(requests.Request))
 
 
-@pytest.mark.parametrize("plan", [PLAN, MissionPlan()], ids=["mission", "no mission"])
+@pytest.mark.parametrize(
+    "plan",
+    [PLAN, replace(PLAN, prepared=PENDING), MissionPlan()],
+    ids=["mission", "paths not yet prepared", "no mission"],
+)
 @pytest.mark.parametrize("on_mission", [False, True])
 @pytest.mark.parametrize("released", [False, True])
 @pytest.mark.parametrize("phase", Phase)

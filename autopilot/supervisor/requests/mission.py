@@ -67,7 +67,8 @@ def start_at_current_step(flight: Flight, view: View, settings: Settings) -> Dec
     if flight.phase == Phase.DISARMED:
         return replace(flight, action_when_armed=ActionWhenArmed.MISSION), ACCEPTED
     event = Event.LAND if is_lowering_step(flight) else Event.MISSION
-    if flight.phase != Phase.ARMED and (flight.phase, event) not in TRANSITIONS:
+    events = (event,) if prepared else (event, Event.HOLD)
+    if flight.phase != Phase.ARMED and any((flight.phase, each) not in TRANSITIONS for each in events):
         return flight, wrong_phase(flight, "Mission")
     if not prepared:
         return _hold_until_prepared(flight, view, settings), _accepted_pending("Mission")
