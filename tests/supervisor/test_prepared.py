@@ -235,6 +235,17 @@ def test_a_mission_that_begins_elsewhere_in_the_air_is_flown_through_as_well(
     assert worst_jump(sky, 0) < TRAPEZOID_M
 
 
+@pytest.mark.parametrize("first", range(1, 5))
+def test_a_first_flight_may_begin_at_any_waypoint(first: int) -> None:
+    """The load is lifted first, and the path begins above where it lay; nothing has been flown before."""
+    sky = prepared_sky(Takeoff(2.0), *ROUND, Waypoint(1.0, 1.0, 2.0), model.Land())
+    assert sky.ask(StartMission(first)).result == ACCEPTED
+    assert sky.ask(Arm(True, False)).result == ACCEPTED
+    start_prepared(sky)
+    sky.run(lambda s: not s.flight.mission.active)
+    assert sky.reached == list(range(first, 6))
+
+
 def test_a_jump_in_flight_is_flown_through_the_remaining_waypoints_as_well() -> None:
     """It waits until their path is prepared from where the load comes to rest; the last one needs no path."""
     sky = started(Takeoff(2.0), *ROUND, model.Land())

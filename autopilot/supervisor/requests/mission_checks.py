@@ -157,8 +157,8 @@ def mission_begin(flight: Flight, ahead: RemainingSteps, settings: Settings) -> 
     """The present step of the mission, and the state in which it begins from here."""
     mission = flight.mission
     state = ahead[mission.step - len(mission.plan.steps)][1].before  # behind a lift that no step requests
-    usual_m_s = settings.limits.speed_m_s
-    speed_m_s = mission.speed_m_s if mission.step else usual_m_s
+    usual_m_s = settings.limits.speed_m_s  # to which a take-off returns
+    speed_m_s = mission.speed_m_s if mission.step and flight.phase not in ON_GROUND else usual_m_s
     return MissionBegin(mission.step, replace(state, speed_m_s=speed_m_s, usual_speed_m_s=usual_m_s))
 
 
