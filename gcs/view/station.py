@@ -240,10 +240,9 @@ class Station:
 
     def _fetch_plans(self, vehicle: WatchedVehicle, ids: tuple[int, int, int]) -> None:
         """Download mission, fence and rally points, each only if it has changed."""
-        before = vehicle.plan_ids or (None, None, None)
-        vehicle.plan_ids = ids
-        for kind, now, then in zip(_PLANS, ids, before, strict=True):
-            if now != then:
+        for kind, version in zip(_PLANS, ids, strict=True):
+            if vehicle.plan_ids.get(kind) != version:
+                vehicle.plan_ids[kind] = version
                 download = MissionDownload(vehicle.target, kind)
                 self._tasks[vehicle.target.system].append(_Task(None, "", [download]))
 
@@ -313,12 +312,13 @@ class Station:
         self._news.append({**record, "ok": done, "text": text})
 
     def _use_result(self, vehicle: WatchedVehicle, operation: Operation) -> None:
-        """Use the result of an exchange: a downloaded mission, fence or list of rally points."""
-        if (
-            not isinstance(operation, MissionDownload)
-            or operation.result is None
-            or not operation.result.done
-        ):
+        """Use the result of an exchange: a downloaded mission, fence or list of rally points. One that was
+        not answered is asked for again."""
+        if not isinstance(operation, MissionDownload) or operation.result is None:
+            return
+        if operation.result.status is Status.UNANSWERED:
+            vehicle.plan_ids.pop(operation.kind, None)
+        if not operation.result.done:
             return
         home = vehicle.origin or vehicle.home
         if operation.kind == mavlink.MAV_MISSION_TYPE_FENCE:

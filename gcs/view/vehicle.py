@@ -48,7 +48,7 @@ class WatchedVehicle:
         self._estimated_positions: deque[tuple[int, PositionNED]] = deque(
             maxlen=_MAX_ESTIMATES
         )  # load positions as estimated
-        self.plan_ids: tuple[int, int, int] | None = None  # versions of mission, fence and rally points
+        self.plan_ids: dict[int, int] = {}  # by MAV_MISSION_TYPE: the version asked for, unless unanswered
         self.sent_texts = 0  # number of view.texts that were sent to the page
 
     def receive(self, one: Received, now_us: int) -> None:

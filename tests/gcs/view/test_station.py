@@ -14,6 +14,7 @@ from autopilot.wire.codec import FrameWriter
 from autopilot.wire.convert.geodesy import Home, enu_from_geodetic
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import WireItem
+from gcs.clients.datagrams import messages
 from gcs.view.controls import SLIDERS
 from gcs.view.station import FAST_MESSAGES, INTERVAL_US, MAX_REQUESTS, Outgoing, Station
 
@@ -263,6 +264,28 @@ def test_mission_and_fence_are_fetched_when_they_have_changed(watched: Watched) 
         [pytest.approx(10, abs=0.05), 0, 0],
     ]
     assert second == {"kind": "exclusion", "centre": [0.0, 0.0], "radius": 2.5}
+
+
+def test_a_mission_whose_download_was_not_answered_is_fetched_later(
+    world: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """For a minute the vehicle does not hear who asks for lists."""
+    world.vehicle.mission = [
+        WireItem(6, mavlink.MAV_CMD_NAV_WAYPOINT, 0, 1, 0, 0, 0, 0, MAP[0] + 900, MAP[1], 3.0)
+    ]
+    watched = Watched(world)
+
+    def without_lists(now_us: int) -> list[bytes]:
+        datagrams = [out.datagram for out in watched.station.poll(now_us)]
+        asked = mavlink.MAVLINK_MSG_ID_MISSION_REQUEST_LIST
+        return [one for one in datagrams if all(each.id != asked for each in messages(one)[0])]
+
+    with monkeypatch.context() as lost:
+        lost.setattr(watched, "_poll", without_lists)
+        watched.run(60.0)
+    assert watched.station.vehicles[1].waypoints == []
+    watched.run(30.0)
+    assert watched.station.vehicles[1].waypoints[-1][0] == pytest.approx(10.0, abs=0.05)
 
 
 FLOATS = st.floats(width=32)
