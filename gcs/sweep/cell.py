@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from pathlib import Path
 
 from autopilot.core.flight_core import Setup
 from autopilot.geometry.packed import Row, packed
@@ -12,12 +13,13 @@ from autopilot.own.own_code import OwnCode, parameters_for
 from autopilot.services.mission_store import StoredMission
 from autopilot.supervisor.state import Area, MissionPlan
 from autopilot.trajectory.prepare import PathLimits
-from autopilot.vehicle.file import load_belief, load_vehicle
+from autopilot.vehicle.file import belief_of, load_belief, load_vehicle
 from autopilot.vehicle.layout import Layout
 from autopilot.vehicle.parameters import apply_settings
 from autopilot.vehicle.rates import control_divider
 from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.items import WireItem
+from gcs.batch.reuse import file_digests
 from gcs.closed_loop import Conditions
 from gcs.expected_flight import expected_flight_s, time_limit_s
 from gcs.foreign_mission import home_of
@@ -55,17 +57,25 @@ class Cell:
 def cell_of(mission: Mission, conditions: Conditions) -> Cell:
     """The cell to which a flight under these conditions belongs. ValueError if it cannot be flown."""
     settings, own = tuple(conditions.settings.items()), conditions.own
-    # custom code may change under the same name: its digests are part of the cache's key
+    # files and custom code may change under the same name: their digests are part of the cache's key
     return _cell(
         mission,
         conditions.vehicle,
         conditions.sensors,
         settings,
         own,
-        own.digests,
+        (*own.digests, *_own_files(conditions)),
         conditions.limit_s,
         conditions.ignored,
     )
+
+
+def _own_files(conditions: Conditions) -> tuple[str, ...]:
+    """Digests of the user's own files of vehicle, assumed vehicle and sensors."""
+    names = [conditions.sensors]
+    if Path(conditions.vehicle).is_file():
+        names += [conditions.vehicle, str(belief_of(conditions.vehicle))]
+    return tuple(file_digests(names).values())
 
 
 @lru_cache(maxsize=8)
@@ -88,7 +98,7 @@ def _cell(
     for name, value in simulator_settings(dict(set_values)).items():
         sim_table.set(name, value)
     settings = settings_of(sim_table)
-    profile = _profile(sensors)
+    profile = load_profile(sensors)
     divider = control_divider(1e6 / settings.tick_us, table)
     setup = build_setup(table, divider, own)
     items = items_of(mission, home)
@@ -108,11 +118,6 @@ def _cell(
         settings=settings,
         wire=packed(wire_of(with_overrides(profile, settings.overrides), settings.noise_scale, home)),
     )
-
-
-@lru_cache(maxsize=8)
-def _profile(name: str) -> Profile:
-    return load_profile(name)
 
 
 def _own_plan(items: tuple[WireItem, ...], home: Home, setup: Setup) -> MissionPlan:

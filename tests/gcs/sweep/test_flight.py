@@ -8,7 +8,10 @@ order within a tick, and the times at which the ground station acts.
 from __future__ import annotations
 
 import io
+import re
 from dataclasses import asdict, replace
+from importlib.resources import files
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -22,11 +25,13 @@ from gcs.analysis.telemetry import telemetry_of
 from gcs.closed_loop import Conditions
 from gcs.closed_loop import fly as fly_with_wire
 from gcs.mission_files import load
+from gcs.sweep.cell import Cell, cell_of
 from gcs.sweep.flight import TRACE_COLUMNS, FlightResult, fly, start_times
 from missions.fileformat import load_mission
 from missions.model import Mission, Takeoff
 from plumbline.laws import Asked, Now, force
 from sitl.hil import HilSimulator
+from sitl.sensors.files import load_profile
 from tests.gcs import tolerances
 
 MOST_TICKS = 20_000
@@ -321,3 +326,26 @@ def test_a_mission_that_leads_over_the_fence_is_refused(short: str) -> None:
         start_times(low, Conditions())
     with pytest.raises(ValueError, match="MIS_INFEASIBLE says what becomes of a path"):
         start_times(load_mission("case-c"), Conditions(settings={"CTL_LAW": PLUMBLINE, "VEH_ROTOR_MAX": 1.4}))
+
+
+def test_files_that_have_changed_are_read_again(tmp_path: Path) -> None:
+    """In a process that goes on, such as a notebook."""
+    vehicles, profiles = files("autopilot.vehicle").joinpath("vehicles"), files("sitl.sensors")
+    bebop = vehicles.joinpath("bebop.toml").read_text(encoding="utf-8")
+    vehicle, sensors, hover = tmp_path / "mine.toml", tmp_path / "sensors.toml", load_mission("hover")
+
+    def cell(true_kg: float, believed_kg: float, profile: str) -> Cell:
+        for path, mass, head in (
+            (vehicle, true_kg, 'believed = "believed.toml"\n'),
+            (tmp_path / "believed.toml", believed_kg, ""),
+        ):
+            path.write_text(head + re.sub(r"quad_mass_kg = .*", f"quad_mass_kg = {mass}", bebop))
+        sensors.write_text(profiles.joinpath(f"{profile}.toml").read_text(encoding="utf-8"))
+        return cell_of(hover, Conditions(str(vehicle), str(sensors)))
+
+    first = cell(0.4, 0.41, "lab")
+    assert (first.truth.quad_mass, first.setup.vehicle.quad_mass) == (0.4, 0.41)
+    assert cell(0.4, 0.41, "lab") is first
+    assert cell(0.5, 0.41, "lab").truth.quad_mass == 0.5
+    assert cell(0.4, 0.39, "lab").setup.vehicle.quad_mass == 0.39
+    assert cell(0.4, 0.41, "rtk").profile == load_profile("rtk")
