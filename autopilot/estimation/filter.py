@@ -57,6 +57,7 @@ from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Vec3, axpy, norm, sub
 from autopilot.geometry.packed import unpack, with_field
 from autopilot.geometry.so3 import rotation_from_quat
+from autopilot.vehicle.parameters import standing_height_m
 from autopilot.wire.parameter_table import ParameterTable
 
 POSITION_STD_TO_FLY = 0.05  # m, with trackers
@@ -123,7 +124,7 @@ def estimator_tuning(table: ParameterTable) -> EstimatorTuning:
         magnetic_age=1e-3 * table["EST_MAG_LAT"],
         declination=radians(table["EST_MAG_DECL"]),
         mounting_std=table["EST_CAM_BIAS"],
-        gear_height=table["EST_GEAR_H"] + table["VEH_ATT_Z"],
+        standing_height=standing_height_m(table),
         load_height=table["EST_LOAD_H"],
         initial_load_forward=table["EST_LAID_FWD"] * length,
         initial_load_std=table["EST_LAID_STD"] * length,

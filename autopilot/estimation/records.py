@@ -158,7 +158,7 @@ class EstimatorTuning(NamedTuple):
     magnetic_age: float  # s
     declination: float  # rad, east of north
     mounting_std: float  # rad, of the camera
-    gear_height: float  # m, height of the vehicle on the ground at the point where its cable is attached
+    standing_height: float  # m, of the cable's attachment above the ground on which the vehicle stands
     load_height: float  # m, height of the centre of the load on the ground
     initial_load_forward: float  # m ahead of the vehicle on the ground: where the load is at first
     initial_load_std: float  # m

@@ -522,7 +522,9 @@ def detect_tautness(
                 load = with_field(load, "laid_height", NOT_LAID)
             return _with_longer_cable(load, tuning)
         load = _with_held_time(load, distance, pull, tuning, dt)
-        speed_var = load.covariance[2] + history.covariance[VELOCITY, VELOCITY]
+        P = history.covariance
+        vehicle_var = max(P[VELOCITY, VELOCITY], P[VELOCITY + 1, VELOCITY + 1], P[VELOCITY + 2, VELOCITY + 2])
+        speed_var = load.covariance[2] + vehicle_var
         speed_known = (
             speed_var < KNOWN_SPEED_STD * KNOWN_SPEED_STD or load.tautness_age_s > SPEED_KNOWN_AFTER_S
         )

@@ -151,7 +151,7 @@ def _lower(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
     legs, here = stopping_legs(flight, view, settings)
     if flight.cable.released:
         clear = _clear_of_load(here, view, settings)
-        low_height = settings.gear_height_m + TOUCH_HEIGHT + HEIGHT_SIGMAS * view.height_std
+        low_height = settings.standing_height_m + TOUCH_HEIGHT + HEIGHT_SIGMAS * view.height_std
         low = (clear[0], clear[1], min(here[2], low_height))
         return (
             *legs,

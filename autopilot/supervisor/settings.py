@@ -12,7 +12,7 @@ from autopilot.trajectory.prepare import PathLimits
 from autopilot.trajectory.rotor_demand import bounds_along_paths
 from autopilot.trajectory.timeline import min_move_duration
 from autopilot.vehicle.layout import MAX_ROTOR_FORCE_N, Layout
-from autopilot.vehicle.parameters import AutopilotParameters, shapes_paths
+from autopilot.vehicle.parameters import AutopilotParameters, law_of, shapes_paths, standing_height_m
 from autopilot.vehicle.rotors import (
     allocation_columns,
     control_authority,
@@ -90,7 +90,7 @@ class WinchSettings:
     max_length_m: float
     speed_m_s: float
     accel_m_s2: float
-    usable: bool  # the law can fly a cable length other than the one it was designed for
+    problem: str  # why the law cannot fly a length other than the one it was designed for; empty if it can
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,7 +130,7 @@ class Settings:
     """The supervisor's parameters: those of the assumed vehicle, and the others by subject."""
 
     cable_length_m: float
-    gear_height_m: float  # of the vehicle's centre of mass above the ground on which it stands
+    standing_height_m: float  # of the cable's attachment above the ground on which the vehicle stands
     min_move_s: float
     gravity_m_s2: float
     load_weight_n: float
@@ -159,7 +159,7 @@ def settings_from(
     length, gravity, load_mass = table["VEH_CABLE_LEN"], table["VEH_GRAVITY"], table["VEH_LOAD_MASS"]
     return Settings(
         cable_length_m=length,
-        gear_height_m=table["EST_GEAR_H"],
+        standing_height_m=standing_height_m(table),
         min_move_s=min_move_duration(length, gravity),
         gravity_m_s2=gravity,
         load_weight_n=load_mass * gravity,
@@ -219,7 +219,7 @@ def settings_from(
             max_length_m=table["WNC_LEN_MAX"],
             speed_m_s=table["WNC_SPEED"],
             accel_m_s2=table["WNC_ACCEL"],
-            usable=supports_reeling,
+            problem="" if supports_reeling else f"the law {law_of(table)} flies one length of the cable",
         ),
         rotors=_rotors(table, (table["VEH_QUAD_MASS"] + load_mass) * gravity),
     )

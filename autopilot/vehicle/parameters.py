@@ -160,3 +160,14 @@ def shapes_paths(table: AutopilotParameters, follows_shaped: bool) -> bool:
     """Whether paths are shaped with these parameters; `follows_shaped`: it is worthwhile with the law."""
     shaping = table["MIS_SHAPE"]
     return shaping == SHAPE_ALWAYS or (shaping == SHAPE_WITH_PLUMBLINE and follows_shaped)
+
+
+def law_of(table: ParameterTable) -> str:
+    """The name of the law that flies with these parameters."""
+    return (*LAWS, "of your own")[int(table["CTL_LAW"])]
+
+
+def standing_height_m(table: ParameterTable) -> float:
+    """Height of the cable's attachment, from which the autopilot takes positions of the vehicle, above the
+    ground on which it stands."""
+    return table["EST_GEAR_H"] + table["VEH_ATT_Z"]

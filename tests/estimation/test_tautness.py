@@ -454,3 +454,16 @@ def test_a_load_that_no_tracker_sees_follows_the_vehicle_at_the_end_of_its_cable
 def test_a_load_is_not_dragged_by_a_cable_that_is_gone() -> None:
     vehicle = blank_state().vehicle._replace(x_quad=(50.0, 0.0, 1.0))
     assert dragged_along((0.0, 0.0, 0.0), vehicle, 0.01, inf) == (0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_a_tracked_cable_is_not_taut_while_the_vehicle_s_speed_is_unknown(axis: int) -> None:
+    """In whatever direction: tautening would take its velocity for the load's."""
+    load = blank_state().load._replace(
+        source=TRACKER, x_load=(0.0, 0.0, 0.0), covariance=(1e-6, 0.0, 1e-4), length=TUNING.cable_length
+    )
+    vehicle = blank_state().vehicle._replace(x_quad=(0.0, 0.0, TUNING.cable_length))
+    for speed_var, taut in ((1.0, 0.0), (1e-4, 1.0)):
+        history = new_history()
+        history.covariance[VELOCITY + axis, VELOCITY + axis] = speed_var
+        assert detect_tautness(load, vehicle, history, 0.0, 0.0, TUNING, 0.004).taut == taut

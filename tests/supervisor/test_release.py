@@ -70,7 +70,7 @@ def test_a_release_is_never_refused(phase: Phase) -> None:
 def test_a_vehicle_without_its_load_creeps_to_the_ground_however_high_it_stands(
     gear_m: float, height_std_m: float
 ) -> None:
-    settings = replace(SETTINGS, gear_height_m=gear_m)
+    settings = replace(SETTINGS, standing_height_m=gear_m)
     flight = Flight(mission=MissionProgress(speed_m_s=1.0), cable=CableState(released=True))
     seen = hanging()._replace(height_std=height_std_m)
     *_, down, creep = entered(flight, Phase.LOWER, seen, settings).legs

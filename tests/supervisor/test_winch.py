@@ -20,9 +20,9 @@ from tests.doubles.sky import ACCEPTED, SETTINGS, Sky, entered
 DENIED, LATER = mavlink.MAV_RESULT_DENIED, mavlink.MAV_RESULT_TEMPORARILY_REJECTED
 
 
-def over(sky: Sky, usable: bool) -> Sky:
+def over(sky: Sky, problem: str) -> Sky:
     """The same sky; its law can, or cannot, fly with another cable length."""
-    sky.settings = replace(sky.settings, winch=replace(sky.settings.winch, usable=usable))
+    sky.settings = replace(sky.settings, winch=replace(sky.settings.winch, problem=problem))
     return sky
 
 
@@ -49,8 +49,9 @@ def test_the_winch_wants_a_load_that_is_held_in_the_air() -> None:
         sky.flight = entered(sky.flight, phase, sky.view, sky.settings)
         assert sky.ask(WinchRequest(0.5)).result == LATER, phase
         sky.flight = held_there
-    assert over(sky, usable=False).ask(WinchRequest(0.5)).result == DENIED
-    over(sky, usable=True).ask(Release())
+    verdict = over(sky, "the law x flies one length of the cable").ask(WinchRequest(0.5))
+    assert (verdict.result, verdict.text) == (DENIED, "Winch denied: the law x flies one length of the cable")
+    over(sky, "").ask(Release())
     assert sky.ask(WinchRequest(0.5)).result == DENIED
 
 

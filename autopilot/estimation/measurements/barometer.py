@@ -25,42 +25,33 @@ from autopilot.estimation.records import (
     EstimatorState,
     EstimatorTuning,
     History,
-    SensorErrors,
 )
 from autopilot.geometry.kernel import kernel
+from autopilot.geometry.lanes import if_above
+from autopilot.geometry.packed import with_field
 
 UNKNOWN_OFFSET_STD = 100.0  # m: the first reading defines the zero
+RESTART_S = 10.0  # without a reading that passes the gate
 
 
 @kernel
 def correct_barometer(
     state: EstimatorState, history: History, height: float, age: float, tuning: EstimatorTuning
 ) -> EstimatorState:
-    """The state after a reading of the height (m), which is used only with a satellite receiver."""
+    """The state after a reading of the height (m), which is used only with a satellite receiver.
+
+    The first one, and the first after none passed the gate for `RESTART_S`, tells the barometer's zero.
+    """
     if state.vehicle.source != RECEIVER:
         return state
     state = with_capacity(state, age, SIZE)
     n, a = state.size, state.sensor_errors
-    starting = a.barometer_age == float("inf")
-    state = with_sensor_errors(
-        state,
-        SensorErrors(
-            a.mounting,
-            a.heading,
-            height - state.vehicle.x_quad[2] if starting else a.barometer,
-            a.gnss,
-            a.horizontal_slow_std,
-            a.vertical_slow_std,
-            a.reversion,
-            a.pending_correction,
-            a.field,
-            a.magnetic_age,
-            age,
-            a.rejected,
-        ),
+    P = history.covariance
+    zero = if_above(a.barometer_age, RESTART_S, height - state.vehicle.x_quad[2], a.barometer)
+    P[BAROMETER, BAROMETER] = if_above(
+        a.barometer_age, RESTART_S, UNKNOWN_OFFSET_STD * UNKNOWN_OFFSET_STD, P[BAROMETER, BAROMETER]
     )
-    if starting:
-        history.covariance[BAROMETER, BAROMETER] = UNKNOWN_OFFSET_STD * UNKNOWN_OFFSET_STD
+    state = with_sensor_errors(state, with_field(a, "barometer", zero))
     past = past_state(state, history, tuning, age)
     innovation = height - past.x_quad[2] - state.sensor_errors.barometer
     start_scalar(history, 0, innovation, tuning.barometer_std * tuning.barometer_std)
@@ -73,4 +64,5 @@ def correct_barometer(
     nis = fuse_scalars(history, 1, n)
     history.consistency[PRESSURE, 0] += 1.0
     history.consistency[PRESSURE, 1] += nis
+    state = with_sensor_errors(state, with_field(state.sensor_errors, "barometer_age", age))
     return inject_error(state, history)

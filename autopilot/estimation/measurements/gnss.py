@@ -156,7 +156,7 @@ def load_ahead(state: EstimatorState, tuning: EstimatorTuning) -> LoadEstimate:
     x_load = (
         x[0] + tuning.initial_load_forward * R[0][0],
         x[1] + tuning.initial_load_forward * R[1][0],
-        x[2] - tuning.gear_height + tuning.load_height,
+        x[2] - tuning.standing_height + tuning.load_height,
     )
     return LoadEstimate(
         x_load,
@@ -260,7 +260,7 @@ def start_from_fix(
     state = restart_slow_error(state, history)
     x_quad, v_quad = sub(fix.position, apply(R, tuning.antenna_position)), fix.velocity
     if not airborne:
-        x_quad = (x_quad[0], x_quad[1], old.x_quad[2] if old.source == RECEIVER else tuning.gear_height)
+        x_quad = (x_quad[0], x_quad[1], old.x_quad[2] if old.source == RECEIVER else tuning.standing_height)
         v_quad = (v_quad[0], v_quad[1], 0.0) if old.source == RECEIVER else ZERO
     vehicle = VehicleEstimate(
         x_quad,

@@ -344,8 +344,8 @@ def winch_problem(ahead: RemainingSteps, settings: Settings) -> str:
         step, after = entry.step, entry.after
         if not isinstance(step, Winch):
             continue
-        if not settings.winch.usable:
-            return f"item {seq}: the law lqr flies one length of the cable"
+        if settings.winch.problem:
+            return f"item {seq}: {settings.winch.problem}"
         if after.released:
             return f"item {seq} needs the load, which is released"
         if step.speed_m_s is not None and step.speed_m_s > settings.winch.speed_m_s:

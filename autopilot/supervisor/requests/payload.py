@@ -79,8 +79,8 @@ def winch(flight: Flight, request: Winch, view: View, settings: Settings) -> Dec
     """Let the cable out or take it in, by a length or as far as possible."""
     if flight.cable.released:
         return flight, denied("Winch denied: the load is released, nothing hangs on the cable")
-    if not settings.winch.usable:
-        return flight, denied("Winch denied: the law lqr flies one length of the cable")
+    if settings.winch.problem:
+        return flight, denied(f"Winch denied: {settings.winch.problem}")
     if flight.phase == Phase.MISSION or flight.mission.waiting:
         return flight, temporarily_denied("Winch denied: pause the mission first")
     if flight.phase != Phase.HOLD or not isinstance(flight.legs[-1], Hold):

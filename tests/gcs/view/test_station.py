@@ -32,10 +32,10 @@ class Watched:
 
     def run(self, seconds: float) -> None:
         """Run station and vehicle for so long."""
-        for _ in self.world.ticks(self.station.receive, self._poll, seconds):
+        for _ in self.world.ticks(self.station.receive, self.poll, seconds):
             self.news += self.station.news()
 
-    def _poll(self, now_us: int) -> list[bytes]:
+    def poll(self, now_us: int) -> list[bytes]:
         return [out.datagram for out in self.station.poll(now_us)]
 
     def ask(self, action: Any, arguments: Any = None, **more: Any) -> dict[str, Any]:
@@ -281,7 +281,7 @@ def test_a_mission_whose_download_was_not_answered_is_fetched_later(
         return [one for one in datagrams if all(each.id != asked for each in messages(one)[0])]
 
     with monkeypatch.context() as lost:
-        lost.setattr(watched, "_poll", without_lists)
+        lost.setattr(watched, "poll", without_lists)
         watched.run(60.0)
     assert watched.station.vehicles[1].waypoints == []
     watched.run(30.0)
