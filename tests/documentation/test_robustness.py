@@ -181,17 +181,24 @@ error grows with the wind because drag is quadratic.{lost}
 
 
 def mass_length() -> str:
-    lengths = levels(of("mass-length", **{MASS: 0.1}), LENGTH, whole)
-    masses = of("mass-length", **{LENGTH: 0.7})
-    borne = levels(masses, MASS, whole)
+    found = of("mass-length")
+    masses, lengths = of("mass-length", **{LENGTH: 0.7}), of("mass-length", **{MASS: 0.1})
+    borne, flown = levels(masses, MASS, whole), levels(lengths, LENGTH, whole)
     to_twice = [error([cell]) for cell in masses if cell[MASS] in borne and cell[MASS] <= 0.2]
     heavier = [error([cell]) for cell in masses if cell[MASS] in borne and cell[MASS] > 0.2]
-    longest = error(of("mass-length", **{MASS: 0.1, LENGTH: lengths[-1]}))
+    usual, shortest, longest = (
+        error(of("mass-length", **{MASS: 0.1, LENGTH: length})) for length in (0.7, flown[0], flown[-1])
+    )
+    too_light = levels(found, MASS, lambda cell: cell["completed"] == 0)
+    too_short = levels(found, LENGTH, lambda cell: cell["completed"] == 0)
     beyond = f" and {min(heavier):.0f} to {max(heavier):.0f} mm beyond" if heavier else ""
-    return f"""Case C. The autopilot learns the mass: it flies {min(borne) / 0.1:g} to {max(borne) / 0.1:g} times the assumed 0.1 kg, with {min(to_twice):.0f} to {max(to_twice):.0f} mm of error up to twice{beyond}.
-It does not learn the length: with the assumed load, it flies cables of {lengths[0]:g} to {lengths[-1]:g} m where it assumes 0.7 m,
-and the error grows to {longest:.0f} mm. A shorter cable counts as never taut, and the vehicle lands. On a longer one a light load
-cannot be set down ("load position not settled").
+    return f"""Case C. The autopilot learns the mass: it flies {min(borne) / 0.1:g} to {max(borne) / 0.1:g} times the assumed 0.1 kg, with {min(to_twice):.0f} to {max(to_twice):.0f} mm of error up to
+twice{beyond}. A load of {max(too_light) / 0.1:g} times the assumed mass is not lifted, whatever the length
+of its cable: its pull is too weak to show that the cable is taut ("Cable never taut, landing").
+
+The law is not told the length: with the assumed load, it flies cables of {flown[0]:g} to {flown[-1]:g} m where it assumes 0.7 m, and
+the error of {usual:.1f} mm grows to {shortest:.1f} mm at {flown[0]:g} m and {longest:.1f} mm at {flown[-1]:g} m. On {max(too_short):g} m or less no load is
+lifted ("Cable pulls at ... m, landing"): a cable may be at most 9 % shorter than assumed.
 """
 
 
