@@ -8,6 +8,8 @@ from pathlib import Path
 
 import click
 import pytest
+from platformdirs.macos import MacOS
+from platformdirs.unix import Unix
 
 from autopilot.shell.command import main as autopilot
 from gcs.cli import gcs
@@ -64,3 +66,12 @@ def test_an_option_in_a_table_is_one_of_its_commands(heading: str) -> None:
 @pytest.mark.parametrize("program", [sitl, autopilot], ids=["sitl", "autopilot"])
 def test_the_table_of_a_program_has_its_options_and_no_others(program: click.Command) -> None:
     assert sorted(told_options(str(program.name))) == sorted(options_of(program))
+
+
+def test_the_folders_are_those_of_the_programs(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("XDG_STATE_HOME", "XDG_CACHE_HOME"):
+        monkeypatch.delenv(name, raising=False)
+    for system in (Unix, MacOS):
+        folders = system("plumbline")
+        for folder in (folders.user_state_dir, folders.user_cache_dir):
+            assert f"`{folder.replace(str(Path.home()), '~')}`" in section("Folders")
