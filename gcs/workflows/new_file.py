@@ -2,12 +2,14 @@
 
 The kinds are the files in `gcs/templates`: `vehicle.toml` is the template of a vehicle. A template is itself
 a valid file of its kind with the name `my_name` (and `MyName` for a class), which is replaced. A comment line
-in it that begins with `Fly it:` contains the command that flies it.
+in it that begins with `Fly it:` contains the command that flies it. The name of the file stands only in
+commands.
 """
 
 from __future__ import annotations
 
 import re
+import shlex
 import sys
 from contextlib import suppress
 from dataclasses import dataclass
@@ -64,7 +66,7 @@ def new_file(kind: str, name: str) -> NewFile:
     if suffix == ".py" and _is_taken(stem):
         raise InputError(f"{name!r}: {stem} is a module of Python or of a library; choose another name")
     path = given.with_name(stem + suffix)
-    text = _template(kind + suffix).replace(f"my_name{suffix}", str(path))
+    text = _template(kind + suffix).replace(f"my_name{suffix}", shlex.quote(str(path)))
     text = text.replace("my_name", stem).replace("MyName", _class_name(stem))
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

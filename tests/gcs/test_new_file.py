@@ -77,6 +77,13 @@ def test_the_next_command_is_said(kind: str) -> None:
     assert "my_name" not in path.read_text(encoding="utf-8") and "MyName" not in path.read_text()
 
 
+@pytest.mark.parametrize("kind", kinds())
+def test_the_command_can_be_pasted_if_a_folder_has_a_space(kind: str) -> None:
+    path = written(kind, "my files/mine")
+    words = shlex.split(written_command(path))
+    assert str(path) in [word.removesuffix(":Mine") for word in words]
+
+
 @pytest.mark.parametrize("name", ["numpy", "signal", "sitl", "pytest"])
 def test_a_module_that_there_is_already_is_not_hidden(name: str) -> None:
     result = run("new", "law", name)
