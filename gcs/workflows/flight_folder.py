@@ -39,7 +39,9 @@ class FlightFolder:
         self._lock = ExitStack()
 
     def keep(self) -> None:
+        """Keep the flight, and delete the telemetry of an earlier attempt, which is not of this flight."""
         self._kept = True
+        (self._path / UNFLOWN_FILE).unlink(missing_ok=True)
 
     def unlock(self) -> None:
         """Allow others to write into the folder, which is complete."""
@@ -92,6 +94,7 @@ class FlightFolder:
             return
         if isinstance(error, KeyboardInterrupt) and tlog.exists() and tlog.stat().st_size > 0:
             report_abandoned(tlog)
+            self.keep()
             return
         self._clear()
 

@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
@@ -189,6 +190,21 @@ def test_a_folder_into_which_nothing_was_flown_is_free_for_the_next_flight(
     with FlightFolder(tmp_path / "out", overwrite=False):
         pass
     assert not telemetry or (tmp_path / "out" / UNFLOWN_FILE).read_bytes() == telemetry
+
+
+@pytest.mark.parametrize("abandoned", [False, True])
+def test_a_flight_leaves_no_telemetry_of_an_earlier_attempt_beside_its_own(
+    tmp_path: Path, abandoned: bool
+) -> None:
+    with FlightFolder(tmp_path, overwrite=False) as folder:
+        folder.set_aside()
+    expected = pytest.raises(KeyboardInterrupt) if abandoned else nullcontext()
+    with expected, FlightFolder(tmp_path, overwrite=True) as folder:
+        (tmp_path / TLOG_FILE).write_bytes(b"telemetry")
+        if abandoned:
+            raise KeyboardInterrupt
+        folder.keep()
+    assert {path.name for path in tmp_path.iterdir()} == {TLOG_FILE, LOCK_FILE}
 
 
 @pytest.mark.parametrize(
