@@ -29,7 +29,7 @@ _PHRASES = (  # phrases of the command line, and their equivalents in Python
     (rf"(?<=flown by vehicle ){re.escape(str(INPUTS))}[/\\]\w+[/\\]([\w-]+)\.toml", r"\1"),
     (r"(?<=another folder) by --out\b", ""),
     (r"add --fresh to", "give fresh=True to"),
-    (r"(?<=has it, or )without it: gcs fly --ignore (\w+)", r"leave \1 out of the vehicle's parameters"),
+    (r"(?<=has it, or )without it: --ignore (\w+)", r"leave \1 out of the vehicle's parameters"),
     (r"--force tries:;?", "force=True tries:"),
     (r"--law\b(?= says|[^s]*instead)", "laws"),
     (r"; see gcs [a-z ]*--help$", ""),

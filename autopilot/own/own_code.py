@@ -67,15 +67,13 @@ class OwnSetup:
 def parameters_for(
     belief: Vehicle,
     own: OwnCode = NO_OWN_CODE,
-    all_known: bool = True,
     ignored: Collection[str] = (),
 ) -> AutopilotParameters:
     """The autopilot's parameters for a vehicle, with those of the custom classes, at the values with which
     the vehicle is delivered. OwnError if a class cannot be loaded, or a parameter of it is invalid.
 
     The vehicle counts as delivered without the `ignored` parameters. VehicleFileError if it is delivered with
-    a parameter that neither the autopilot nor a class has, unless there may be classes besides `own`
-    (`all_known` is False).
+    a parameter that neither the autopilot nor a class has.
     """
     if ignored:
         kept = {name: value for name, value in belief.parameters.items() if name not in ignored}
@@ -91,11 +89,11 @@ def parameters_for(
             label = f"{loaded_class.reference}: {loaded_class.kind.__name__}.parameters: {error}"
             raise OwnError(f"--{loaded_class.role.lower()} {label}") from None
     unknown = [name for name in belief.parameters if name not in parameter_table]
-    if unknown and all_known:
+    if unknown:
         raise VehicleFileError(
             [
                 f"{_LABEL}{unknown_parameter_text(name, parameter_table.names)}; fly with the custom law, "
-                f"estimator or planner that has it, or without it: gcs fly --ignore {name}"
+                f"estimator or planner that has it, or without it: --ignore {name}"
                 for name in unknown
             ]
         )

@@ -90,7 +90,7 @@ def _address_or_none(text: str) -> Address | None:
     help="Your own path planner (docs/planners.md).",
 )
 @settings_option("Set a parameter; repeatable. SIM_ parameters of the simulator are ignored.")
-@ignore_option
+@ignore_option("Fly")
 @origin_option
 @click.option(
     "--storage",

@@ -315,8 +315,9 @@ def setting_option(text: str) -> tuple[str, float]:
         raise click.BadParameter(f"{text!r}; must be NAME=VALUE with a number") from None
 
 
-def ignore_option(function: F) -> F:
-    """--ignore of every command that starts an autopilot."""
+def ignore_option(verb: str) -> Callable[[F], F]:
+    """--ignore of every command that starts an autopilot, or foresees what it does; the help begins with
+    `verb`."""
 
     def in_capitals(_: click.Context, __: click.Parameter, names: tuple[str, ...]) -> tuple[str, ...]:
         return tuple(name.strip().upper() for name in names)
@@ -326,8 +327,9 @@ def ignore_option(function: F) -> F:
         metavar="NAME",
         multiple=True,
         callback=in_capitals,
-        help="Fly without a parameter in the vehicle's file, for example that of another law; repeatable.",
-    )(function)
+        help=f"{verb} without a parameter in the vehicle's file, for example that of another law; "
+        "repeatable.",
+    )
 
 
 def vehicle_option(help_text: str) -> Callable[[F], F]:

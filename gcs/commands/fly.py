@@ -83,7 +83,7 @@ _STARTED_ONLY = (
     multiple=True,
     help="Set a parameter of the simulator (SIM_*) or of the autopilot; repeatable.",
 )
-@ignore_option
+@ignore_option("Fly")
 @click.option(
     "--log-sensors",
     is_flag=True,

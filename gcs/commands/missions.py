@@ -6,6 +6,7 @@ from dataclasses import asdict
 
 import click
 
+from autopilot.shell.options import ignore_option
 from gcs.commands.options import (
     SettingType,
     json_option,
@@ -47,6 +48,7 @@ def missions_command(as_json: bool) -> None:
 @mission_argument
 @vehicle_option("The vehicle that is to fly it")
 @planner_option
+@ignore_option("Check")
 @click.option(
     "--set",
     "settings",
@@ -67,6 +69,7 @@ def check_command(
     mission: str,
     vehicle: str,
     planner: str | None,
+    ignore: tuple[str, ...],
     settings: tuple[str, ...],
     as_asked: bool,
     law: str | None,
@@ -99,15 +102,15 @@ def check_command(
         )
 
     from gcs.workflows.before_flight import CHECKING_TEXT
-    from gcs.workflows.check_mission import check_mission
+    from gcs.workflows.check_mission import check_mission, check_parameters
     from gcs.workflows.flight_options import parse_setting
 
     given = [parse_setting(one) for one in settings]
-
+    check_parameters(vehicle, planner or "", ignore)
     if planner:
         from gcs.workflows.own_planner import own_planner
 
-        with own_planner(planner, vehicle) as own:
+        with own_planner(planner, vehicle, ignore) as own:
             found = check_mission(mission, vehicle, as_asked, own, given, law or "")
     else:
         with notify_if_slow(CHECKING_TEXT, as_json):

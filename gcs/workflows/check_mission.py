@@ -9,6 +9,7 @@ from functools import reduce
 from itertools import groupby
 from math import dist, floor, inf
 
+from autopilot.own.own_code import OwnCode
 from autopilot.trajectory.feasibility import PathReport, VehicleLimits, Violation, paths
 from autopilot.trajectory.route import PlanError, Planner
 from autopilot.trajectory.signals import risen_share
@@ -24,8 +25,7 @@ from autopilot.vehicle.parameters import (
 )
 from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.items import decode_items
-from autopilot.wire.parameter_names import unknown_parameter_text
-from gcs.errors import GcsError
+from gcs.errors import GcsError, InputError
 from gcs.expected_flight import expected_entries, expected_flight_s, limit_text, time_limit_s
 from gcs.foreign_mission import ForeignMission, home_text
 from gcs.mission_files import read
@@ -39,7 +39,7 @@ from gcs.mission_items import (
 )
 from gcs.workflows.before_flight import law_problem, unused_planner_text
 from gcs.workflows.charge import charge_after, charge_warning
-from gcs.workflows.flight_inputs import vehicle_warnings
+from gcs.workflows.flight_inputs import delivered_parameters, vehicle_warnings
 from gcs.workflows.flight_options import FlightOptions, parse_setting
 from gcs.workflows.flyable import violations, winch_items
 from gcs.workflows.refusals import Answer, ask_supervisor
@@ -218,16 +218,6 @@ def _move_s(entry: TimelineEntry) -> float:
     return entry.duration_s if isinstance(entry.step, LoadPath | AttitudeRun) else entry.transfer_s
 
 
-def parameter_notes(belief: Vehicle, known: Collection[str]) -> Iterator[str]:
-    """A line about each parameter with which the vehicle is delivered and that only custom code may have."""
-    for name in belief.parameters:
-        if name not in known:
-            yield (
-                f"note: parameters.{unknown_parameter_text(name, known)}; if it is that of a custom law, "
-                "estimator or planner, only flights with this one are possible"
-            )
-
-
 def winch_notes(mission: Mission, table: AutopilotParameters) -> Iterator[str]:
     """A line about each winch item while the load is carried, which path reports do not include."""
     for entry, step, length_m in winch_items(mission, table):
@@ -364,6 +354,17 @@ def _with_charge(found: CheckResult, mission: Mission, table: AutopilotParameter
     return replace(found, battery_left_pct=100.0 * charge.left, warnings=warnings)
 
 
+def check_parameters(vehicle: str, planner: str, ignored: Collection[str]) -> None:
+    """GcsError if the vehicle is delivered with a parameter that neither the autopilot nor the `planner` has
+    and that is not `ignored`: flights without the custom code that has it are refused. So is one of the
+    autopilot's own among those `ignored`, as paths are judged by it."""
+    table = delivered_parameters(vehicle, OwnCode(planner=planner), ignored)
+    for name in ignored:
+        if name in table:
+            text = f"the mission is checked with it; --set {name}=VALUE gives it another value"
+            raise InputError(f"--ignore {name}: {text}")
+
+
 def check_mission(
     name_or_path: str,
     vehicle: str,
@@ -415,7 +416,6 @@ def check_mission(
     warnings += (
         *winch_notes(mission, table),
         *notes_after_release(mission, table),
-        *parameter_notes(limits.vehicle, table.names),
     )
     if planner is not None and (unused := unused_planner_text(mission)):
         warnings += (f"the planner {unused}",)

@@ -11,7 +11,6 @@ from collections.abc import Collection, Iterable
 from autopilot.own.own_code import NO_OWN_CODE, OwnCode, parameters_for, require_delivered
 from autopilot.own.source import OwnError
 from autopilot.vehicle.file import load_truth_and_belief, load_vehicle
-from autopilot.vehicle.model import Vehicle
 from autopilot.vehicle.parameters import apply_settings, autopilot_parameters
 from autopilot.vehicle.rates import RateError, control_divider
 from autopilot.wire.parameter_names import unknown_parameter_text
@@ -40,12 +39,13 @@ def check_flight_inputs(
     does not divide the rate that it must divide, or if custom code cannot fly. `ignored`: parameters in the
     vehicle's file that have no effect, which it must have."""
     try:
-        found, believed = load_truth_and_belief(vehicle)
+        found, _ = load_truth_and_belief(vehicle)
         load_profile(sensors)
     except FileError as error:
         raise input_error(error) from None
     given = list(settings)
-    autopilot, simulator = _table(believed, own_parts, ignored), sim_parameters(truth_of(found))
+    autopilot = delivered_parameters(vehicle, own_parts, ignored)
+    simulator = sim_parameters(truth_of(found))
     for name, value in given:
         if name == "CTL_LAW":
             raise InputError("--set CTL_LAW is what --law names; give --law")
@@ -163,10 +163,14 @@ def split_settings(
     return simulator_part, [(name, value) for name, value in given if name not in simulator]
 
 
-def _table(vehicle: Vehicle, own: OwnCode, ignored: Collection[str]) -> ParameterTable:
+def delivered_parameters(vehicle: str, own: OwnCode, ignored: Collection[str]) -> ParameterTable:
+    """The autopilot's parameters with which a vehicle is delivered, without the `ignored` ones. GcsError if
+    there is no such vehicle, if it is not delivered with one of these, or if it is with one that neither the
+    autopilot nor the custom code has."""
     try:
-        require_delivered(vehicle, ignored)
-        return parameters_for(vehicle, own, ignored=ignored)
+        _, belief = load_truth_and_belief(vehicle)
+        require_delivered(belief, ignored)
+        return parameters_for(belief, own, ignored=ignored)
     except OwnError as error:
         raise InputError(str(error)) from None
     except FileError as error:

@@ -42,8 +42,9 @@ file:
   airframe file of other autopilots. `heavy-real` sets `MIS_ROTOR_MARG` 35 and `MIS_INFEASIBLE` 1: its paths
   leave room for unknown effects, and are flown slower where necessary. Parameters that you set take
   precedence. The table may contain the parameters of a custom law, estimator or planner; flights without this
-  one are then refused, unless `--ignore NAME` of `gcs fly` and `autopilot` names them. A sweep with several
-  laws needs no option: what one of the laws defines has no effect on the others.
+  one are then refused, and `gcs check` refuses the vehicle, unless `--ignore NAME` of `gcs fly`, `gcs check`
+  and `autopilot` names them. A sweep with several laws needs no option: what one of the laws defines has no
+  effect on the others.
 
 The truth and the autopilot's model are two sets of the same values. There are three ways to make them
 differ:

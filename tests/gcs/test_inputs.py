@@ -132,6 +132,32 @@ def test_a_parameter_to_be_ignored_is_one_of_the_vehicles(tmp_path):
     check_flight_inputs(str(file), "lab", [], ignored=["MY_GAIN"])
 
 
+PLANNER = """
+from plumbline.examples.minimum_snap import MinimumSnap
+from plumbline.planners import Parameter
+
+class Mine(MinimumSnap):
+    parameters = {**MinimumSnap.parameters, "MY_GAIN": Parameter(1.0, 0.0, 5.0, "", "A gain")}
+"""
+
+
+def test_a_check_refuses_a_vehicle_that_no_flight_without_custom_code_would_take(tmp_path):
+    file, planner = tmp_path / "mine.toml", tmp_path / "mine.py"
+    plumbline.Vehicle.load("bebop").replace(parameters={"MY_GAIN": 3, "MIS_SPEED": 1}).save(file)
+    planner.write_text(PLANNER, encoding="utf-8")
+    flown = refused("fly", "hover", "--vehicle", str(file))
+    assert flown.startswith("gcs: the vehicle's parameters.MY_GAIN: no such parameter; ")
+    assert refused("check", "hover", "--vehicle", str(file)) == flown
+
+    def checked(*options):
+        return CliRunner().invoke(gcs, ["check", "hover", "--vehicle", str(file), *options])
+
+    for options in (("--ignore", "my_gain"), ("--planner", f"{planner}:Mine")):
+        assert checked(*options).stdout.startswith(f"hover: vehicle {file} can fly it"), options
+    line = refused("check", "hover", "--vehicle", str(file), "--ignore", "MY_GAIN", "--ignore", "MIS_SPEED")
+    assert line.startswith("gcs: --ignore MIS_SPEED: the mission is checked with it; --set MIS_SPEED=VALUE ")
+
+
 def test_settings_of_both_programs_are_taken():
     check_flight_inputs("thesis", "ideal", [("SIM_WIND_E", 3.0), ("SIM_LOSS_PCT", 5.0), ("NGC_KX", 5.0)])
 

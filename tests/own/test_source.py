@@ -112,7 +112,6 @@ def test_a_vehicle_is_delivered_with_the_parameters_of_its_law() -> None:
     assert table["MY_GAIN"] == table.describe("MY_GAIN").default == 3.0
     with pytest.raises(VehicleFileError, match=r"^the vehicle's parameters\.MY_GAIN: no such .* law"):
         parameters_for(belief)
-    assert "MY_GAIN" not in parameters_for(belief, all_known=False)
     with pytest.raises(VehicleFileError, match=r"parameters\.MY_GAIN = 9\.0 1/s; must be 0 \.\.\. 5"):
         parameters_for(delivered_with("MY_GAIN = 9.0"), law)
     with pytest.raises(VehicleFileError, match=r"parameters\.MIS_SPED: no such parameter; did you mean MIS"):
