@@ -9,9 +9,10 @@ from autopilot.trajectory.feasibility import VehicleLimits
 from autopilot.vehicle.file import load_truth_and_belief
 from autopilot.vehicle.parameters import AutopilotParameters, autopilot_parameters
 from autopilot.vehicle.shipped import VehicleFileError
+from autopilot.wire.parameter_names import unknown_parameter_text
 from autopilot.wire.parameter_table import ParameterError
 from gcs.errors import InputError, input_error
-from gcs.workflows.flight_options import Settings
+from gcs.workflows.flight_options import SIMULATOR_PREFIX, Settings
 
 if TYPE_CHECKING:
     from autopilot.vehicle.model import Vehicle
@@ -84,10 +85,12 @@ _ROTOR_LIMITS = ("VEH_ROTOR_MIN", "VEH_ROTOR_MAX", "VEH_ROTOR_LIM")
 def with_settings(table: AutopilotParameters, settings: Settings) -> AutopilotParameters:
     """The table with these parameters set; InputError for one that it has not, or a value out of range."""
     for name, value in settings:
-        if name not in table:
+        if name not in table and name.startswith(SIMULATOR_PREFIX):
             raise InputError(
                 f"--set {name}: must be a parameter of the autopilot, or SIM_WIND_E or SIM_WIND_N"
             )
+        if name not in table:
+            raise InputError(f"--set {unknown_parameter_text(name, table.names)}")
         try:
             table.set(name, value)
         except ParameterError as error:

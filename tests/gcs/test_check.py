@@ -392,10 +392,16 @@ def test_paths_are_checked_with_the_parameters_that_are_set(value: str, flies: b
     assert (f"must leave {value} % of the rotors' range" in found.output) == (not flies)
 
 
-@pytest.mark.parametrize("setting", ["SIM_LOAD_MASS=3", "MIS_NOTHING=1"])
-def test_what_no_check_judges_is_not_set(setting: str) -> None:
-    name = setting.partition("=")[0]
-    with pytest.raises(InputError, match=f"--set {name}: must be a parameter of the autopilot"):
+@pytest.mark.parametrize(
+    ("setting", "told"),
+    [
+        ("SIM_LOAD_MASS=3", "SIM_LOAD_MASS: must be a parameter of the autopilot, or SIM_WIND_E"),
+        ("MIS_ROTOR_MARGE=3", "MIS_ROTOR_MARGE: no such parameter; did you mean MIS_ROTOR_MARG"),
+        ("MIS_NOTHING=1", "MIS_NOTHING: no such parameter; there are MIS_ACCEL, "),
+    ],
+)
+def test_what_no_check_judges_is_not_set(setting: str, told: str) -> None:
+    with pytest.raises(InputError, match=f"^--set {told}"):
         check_mission("hover", "bebop", False, settings=[parse_setting(setting)])
 
 
