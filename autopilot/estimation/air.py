@@ -16,6 +16,7 @@ from autopilot.estimation.records import AIR, TRACKER, AirEstimate, Array, Estim
 from autopilot.estimation.tautness import is_never_observed
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Vec3, dot
+from autopilot.geometry.packed import with_field
 
 DRAG_CHANGE_TIME_S = 0.15  # for which a change of drag lasts
 # m/s^2, by a wind that a camera cannot distinguish from its own mounting and the slow error of a receiver
@@ -86,16 +87,7 @@ def predict_air(
     vehicle_accel = (vehicle_decay * air.vehicle_accel[0], vehicle_decay * air.vehicle_accel[1])
     d = (load_decay * air.load_accel[0], load_decay * air.load_accel[1])
     if load.taut == 0.0 or before.taut == 0.0:
-        return AirEstimate(
-            d,
-            vehicle_accel,
-            air.load_drag,
-            air.mean_velocity,
-            air.mean_accel,
-            air.velocity_accel_covariance,
-            air.velocity_variance,
-            air.gust_variance,
-        )
+        return with_field(with_field(air, "load_accel", d), "vehicle_accel", vehicle_accel)
     v, c = load.v_load, air.load_drag
     d = (d[0] - c * (v[0] - before.v_load[0]), d[1] - c * (v[1] - before.v_load[1]))
     share = dt / (min(LEARNING_S, load.tautness_age_s) + dt)
@@ -117,12 +109,12 @@ def predict_air(
     gust2 = g0 * g0 + g1 * g1 - NOISE_SHARE * (P[AIR, AIR] + P[AIR + 1, AIR + 1])
     gust_variance = max(0.0, air.gust_variance + gust_share * (gust2 - air.gust_variance))
     return AirEstimate(
-        d,
-        vehicle_accel,
-        drag,
-        mean_velocity,
-        mean_accel,
-        velocity_accel_covariance,
-        velocity_variance,
-        gust_variance,
+        load_accel=d,
+        vehicle_accel=vehicle_accel,
+        load_drag=drag,
+        mean_velocity=mean_velocity,
+        mean_accel=mean_accel,
+        velocity_accel_covariance=velocity_accel_covariance,
+        velocity_variance=velocity_variance,
+        gust_variance=gust_variance,
     )

@@ -188,44 +188,13 @@ def with_capacity(state: EstimatorState, age: float, size: int) -> EstimatorStat
 @kernel
 def vehicle_with_status(v: VehicleEstimate, age_s: float, rejected: float) -> VehicleEstimate:
     """The vehicle with another age and count of rejections."""
-    return VehicleEstimate(
-        v.x_quad,
-        v.v_quad,
-        v.quat_wxyz,
-        v.omega_body,
-        v.gyro_bias,
-        v.accel_bias,
-        v.accel_quad,
-        age_s,
-        rejected,
-        v.source,
-        v.turning_accel,
-    )
+    return with_field(with_field(v, "age_s", age_s), "rejected", rejected)
 
 
 @kernel
 def load_with_status(load: LoadEstimate, age_s: float, rejected: float, source: float) -> LoadEstimate:
     """The load with another age, count of rejections and source."""
-    return LoadEstimate(
-        load.x_load,
-        load.v_load,
-        load.q_cable,
-        load.q_cable_dot,
-        load.across,
-        load.length,
-        load.covariance,
-        load.taut,
-        load.tension,
-        load.pull,
-        load.pull_duration_s,
-        load.tautness_age_s,
-        age_s,
-        rejected,
-        source,
-        load.laid_height,
-        load.laid_height_var,
-        load.length_share,
-    )
+    return with_field(with_field(with_field(load, "age_s", age_s), "rejected", rejected), "source", source)
 
 
 @kernel
@@ -249,26 +218,9 @@ def corrected_load(
         # the load's position is known relative to the vehicle, whose position a plain receiver measures no
         # better
         x_load = add(x_load, (e[POSITION], e[POSITION + 1], 0.0))
-    return LoadEstimate(
-        x_load,
-        v_load,
-        q,
-        q_dot,
-        across,
-        length,
-        load.covariance,
-        load.taut,
-        load.tension,
-        load.pull,
-        load.pull_duration_s,
-        load.tautness_age_s,
-        load.age_s,
-        load.rejected,
-        load.source,
-        load.laid_height,
-        load.laid_height_var,
-        load.length_share,
-    )
+    load = with_field(with_field(load, "x_load", x_load), "v_load", v_load)
+    load = with_field(with_field(load, "q_cable", q), "q_cable_dot", q_dot)
+    return with_field(with_field(load, "across", across), "length", length)
 
 
 @kernel
@@ -279,34 +231,26 @@ def inject_error(state: EstimatorState, history: History) -> EstimatorState:
     position_change = (e[POSITION], e[POSITION + 1], e[POSITION + 2])
     gyro_bias_change = (e[GYRO_BIAS], e[GYRO_BIAS + 1], e[GYRO_BIAS + 2])
     vehicle = VehicleEstimate(
-        add(v.x_quad, position_change),
-        add(v.v_quad, (e[VELOCITY], e[VELOCITY + 1], e[VELOCITY + 2])),
-        quat_normalise(quat_multiply(rotation, v.quat_wxyz)),
-        sub(v.omega_body, gyro_bias_change),
-        add(v.gyro_bias, gyro_bias_change),
-        add(v.accel_bias, (e[ACCEL_BIAS], e[ACCEL_BIAS + 1], e[ACCEL_BIAS + 2])),
-        v.accel_quad,
-        v.age_s,
-        v.rejected,
-        v.source,
-        v.turning_accel,
+        x_quad=add(v.x_quad, position_change),
+        v_quad=add(v.v_quad, (e[VELOCITY], e[VELOCITY + 1], e[VELOCITY + 2])),
+        quat_wxyz=quat_normalise(quat_multiply(rotation, v.quat_wxyz)),
+        omega_body=sub(v.omega_body, gyro_bias_change),
+        gyro_bias=add(v.gyro_bias, gyro_bias_change),
+        accel_bias=add(v.accel_bias, (e[ACCEL_BIAS], e[ACCEL_BIAS + 1], e[ACCEL_BIAS + 2])),
+        accel_quad=v.accel_quad,
+        age_s=v.age_s,
+        rejected=v.rejected,
+        source=v.source,
+        turning_accel=v.turning_accel,
     )
     sensor_errors = a
     if state.size >= AIDED_SIZE:
-        sensor_errors = SensorErrors(
-            (a.mounting[0] + e[MOUNTING], a.mounting[1] + e[MOUNTING + 1]),
-            a.heading + e[HEADING],
-            a.barometer + e[BAROMETER],
-            add(a.gnss, (e[GNSS], e[GNSS + 1], e[GNSS + 2])),
-            a.horizontal_slow_std,
-            a.vertical_slow_std,
-            a.reversion,
-            add(a.pending_correction, position_change) if a.reversion < 1.0 else a.pending_correction,
-            a.field,
-            a.magnetic_age,
-            a.barometer_age,
-            a.rejected,
-        )
+        pending = add(a.pending_correction, position_change) if a.reversion < 1.0 else a.pending_correction
+        mounting = (a.mounting[0] + e[MOUNTING], a.mounting[1] + e[MOUNTING + 1])
+        sensor_errors = with_field(with_field(a, "mounting", mounting), "heading", a.heading + e[HEADING])
+        sensor_errors = with_field(sensor_errors, "barometer", a.barometer + e[BAROMETER])
+        sensor_errors = with_field(sensor_errors, "gnss", add(a.gnss, (e[GNSS], e[GNSS + 1], e[GNSS + 2])))
+        sensor_errors = with_field(sensor_errors, "pending_correction", pending)
     air = state.air
     vehicle_accel = air.vehicle_accel
     if state.size == SIZE:

@@ -42,7 +42,6 @@ from autopilot.estimation.records import (
     History,
     ImuReading,
     LoadEstimate,
-    SensorErrors,
     Uncertainty,
     VehicleEstimate,
 )
@@ -69,6 +68,7 @@ from autopilot.geometry.linear import (
     scale,
     sub,
 )
+from autopilot.geometry.packed import with_field
 from autopilot.geometry.rigid_body import angular_accel, arm_accel
 from autopilot.geometry.s2 import normalise, tangent
 from autopilot.geometry.so3 import quat_exp, quat_multiply, quat_normalise, rotation_from_quat
@@ -137,17 +137,17 @@ def predict_vehicle(
     force = apply(R, accel)  # specific force, ENU
     accel_quad = (force[0], force[1], force[2] - tuning.gravity)
     predicted = VehicleEstimate(
-        axpy(0.5 * dt * dt, accel_quad, axpy(dt, vehicle.v_quad, vehicle.x_quad)),
-        axpy(dt, accel_quad, vehicle.v_quad),
-        quat_normalise(quat_multiply(vehicle.quat_wxyz, quat_exp(scale(dt, gyro)))),
-        omega,
-        vehicle.gyro_bias,
-        vehicle.accel_bias,
-        accel_quad,
-        vehicle.age_s + dt,
-        vehicle.rejected,
-        vehicle.source,
-        turning,
+        x_quad=axpy(0.5 * dt * dt, accel_quad, axpy(dt, vehicle.v_quad, vehicle.x_quad)),
+        v_quad=axpy(dt, accel_quad, vehicle.v_quad),
+        quat_wxyz=quat_normalise(quat_multiply(vehicle.quat_wxyz, quat_exp(scale(dt, gyro)))),
+        omega_body=omega,
+        gyro_bias=vehicle.gyro_bias,
+        accel_bias=vehicle.accel_bias,
+        accel_quad=accel_quad,
+        age_s=vehicle.age_s + dt,
+        rejected=vehicle.rejected,
+        source=vehicle.source,
+        turning_accel=turning,
     )
     return predicted, R
 
@@ -376,24 +376,15 @@ def predict(
         imu_height = learned_imu_height(
             imu_height, force, measured, load, vehicle, thrust, moment, tuning, step
         )
+    pending = scale(1.0 - dt / PENDING_CORRECTION_TIME_S, sensor_errors.pending_correction)
+    sensor_errors = with_field(sensor_errors, "pending_correction", pending)
+    sensor_errors = with_field(sensor_errors, "magnetic_age", sensor_errors.magnetic_age + dt)
+    sensor_errors = with_field(sensor_errors, "barometer_age", sensor_errors.barometer_age + dt)
     predicted = EstimatorState(
         state.time_s + dt,
         vehicle,
         load,
-        SensorErrors(
-            sensor_errors.mounting,
-            sensor_errors.heading,
-            sensor_errors.barometer,
-            sensor_errors.gnss,
-            sensor_errors.horizontal_slow_std,
-            sensor_errors.vertical_slow_std,
-            sensor_errors.reversion,
-            scale(1.0 - dt / PENDING_CORRECTION_TIME_S, sensor_errors.pending_correction),
-            sensor_errors.field,
-            sensor_errors.magnetic_age + dt,
-            sensor_errors.barometer_age + dt,
-            sensor_errors.rejected,
-        ),
+        sensor_errors,
         predict_air(air, state.load, load, history.covariance, growth, tuning, dt),
         state_uncertainty(history, load, state.size),
         imu,

@@ -1,4 +1,8 @@
-"""Records of the estimator: its state, its assumptions about the sensors, and its readings."""
+"""Records of the estimator: its state, its assumptions about the sensors, and its readings.
+
+Kernels replace a few fields by `with_field`. One that computes most of them names each, unless there are more
+than 15, which cannot be passed to compiled code by name.
+"""
 
 from __future__ import annotations
 

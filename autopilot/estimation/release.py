@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from autopilot.estimation.records import TRACKER, EstimatorState, EstimatorTuning, History
-from autopilot.estimation.tautness import slacken, with_load_position
+from autopilot.estimation.tautness import slacken
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.packed import with_field
 
@@ -24,5 +24,5 @@ def release_load(state: EstimatorState, history: History, tuning: EstimatorTunin
         load, history, RELEASE_POSITION_STD * RELEASE_POSITION_STD, RELEASE_SPEED_STD * RELEASE_SPEED_STD
     )
     if load.source != TRACKER:
-        load = with_load_position(load, (load.x_load[0], load.x_load[1], tuning.load_height))
+        load = with_field(load, "x_load", (load.x_load[0], load.x_load[1], tuning.load_height))
     return with_field(state, "load", load)

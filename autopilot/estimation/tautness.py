@@ -364,26 +364,9 @@ def add_snatch_uncertainty(
 def _with_tautness(
     load: LoadEstimate, taut: float, length: float, pull: float, pull_duration_s: float
 ) -> LoadEstimate:
-    return LoadEstimate(
-        load.x_load,
-        load.v_load,
-        load.q_cable,
-        load.q_cable_dot,
-        load.across,
-        length,
-        load.covariance,
-        taut,
-        load.tension,
-        pull,
-        pull_duration_s,
-        load.tautness_age_s if taut == load.taut else 0.0,
-        load.age_s,
-        load.rejected,
-        load.source,
-        load.laid_height,
-        load.laid_height_var,
-        load.length_share,
-    )
+    load = with_field(load, "tautness_age_s", load.tautness_age_s if taut == load.taut else 0.0)
+    load = with_field(with_field(load, "taut", taut), "length", length)
+    return with_field(with_field(load, "pull", pull), "pull_duration_s", pull_duration_s)
 
 
 @kernel
@@ -547,7 +530,7 @@ def detect_tautness(
         ):
             load = tauten(load, vehicle, history, tuning, tuning.cable_length)
             x_load = axpy(load.length, load.q_cable, vehicle.x_quad)
-            return with_load_position(load, x_load)
+            return with_field(load, "x_load", x_load)
         return load
     # a gust, or a load lighter than assumed, takes from the pull that is left to fall
     full_pull = max(weight - max(missing_pull, 0.0), MIN_FULL_PULL * weight)
@@ -559,28 +542,3 @@ def detect_tautness(
         var = 0.5 * L * L * (P[DIRECTION, DIRECTION] + P[DIRECTION + 1, DIRECTION + 1])
         return slacken(load, history, var, 0.0)
     return load
-
-
-@kernel
-def with_load_position(load: LoadEstimate, x_load: Vec3) -> LoadEstimate:
-    """The load at `x_load`."""
-    return LoadEstimate(
-        x_load,
-        load.v_load,
-        load.q_cable,
-        load.q_cable_dot,
-        load.across,
-        load.length,
-        load.covariance,
-        load.taut,
-        load.tension,
-        load.pull,
-        load.pull_duration_s,
-        load.tautness_age_s,
-        load.age_s,
-        load.rejected,
-        load.source,
-        load.laid_height,
-        load.laid_height_var,
-        load.length_share,
-    )

@@ -42,6 +42,7 @@ from autopilot.estimation.records import (
 )
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Vec3, apply, apply_transposed, cross, dot, scale, sub
+from autopilot.geometry.packed import with_field
 from autopilot.geometry.so3 import exp, rotation_from_quat
 
 REJECTIONS_BEFORE_RESET = 10.0
@@ -54,26 +55,8 @@ def with_observed_position(
     load: LoadEstimate, x_load: Vec3, position_var: float, age_s: float
 ) -> LoadEstimate:
     """A load on the ground moved to `x_load`."""
-    return LoadEstimate(
-        x_load,
-        load.v_load,
-        load.q_cable,
-        load.q_cable_dot,
-        load.across,
-        load.length,
-        (position_var, 0.0, 0.0),
-        load.taut,
-        load.tension,
-        load.pull,
-        load.pull_duration_s,
-        load.tautness_age_s,
-        age_s,
-        0.0,
-        CAMERA,
-        load.laid_height,
-        load.laid_height_var,
-        load.length_share,
-    )
+    load = with_field(with_field(load, "x_load", x_load), "covariance", (position_var, 0.0, 0.0))
+    return load_with_status(load, age_s, 0.0, CAMERA)
 
 
 @kernel

@@ -131,20 +131,9 @@ def with_slow_error(
     sensor_errors: SensorErrors, horizontal: float, vertical: float, reversion: float
 ) -> SensorErrors:
     """The sensor errors with the deviations of the receiver's slow error."""
-    return SensorErrors(
-        sensor_errors.mounting,
-        sensor_errors.heading,
-        sensor_errors.barometer,
-        sensor_errors.gnss,
-        horizontal,
-        vertical,
-        reversion,
-        sensor_errors.pending_correction,
-        sensor_errors.field,
-        sensor_errors.magnetic_age,
-        sensor_errors.barometer_age,
-        sensor_errors.rejected,
-    )
+    sensor_errors = with_field(sensor_errors, "horizontal_slow_std", horizontal)
+    sensor_errors = with_field(sensor_errors, "vertical_slow_std", vertical)
+    return with_field(sensor_errors, "reversion", reversion)
 
 
 @kernel
@@ -263,17 +252,17 @@ def start_from_fix(
         x_quad = (x_quad[0], x_quad[1], old.x_quad[2] if old.source == RECEIVER else tuning.standing_height)
         v_quad = (v_quad[0], v_quad[1], 0.0) if old.source == RECEIVER else ZERO
     vehicle = VehicleEstimate(
-        x_quad,
-        v_quad,
-        quat,
-        old.omega_body,
-        old.gyro_bias,
-        old.accel_bias,
-        old.accel_quad,
-        fix.age_s,
-        0.0,
-        RECEIVER,
-        old.turning_accel,
+        x_quad=x_quad,
+        v_quad=v_quad,
+        quat_wxyz=quat,
+        omega_body=old.omega_body,
+        gyro_bias=old.gyro_bias,
+        accel_bias=old.accel_bias,
+        accel_quad=old.accel_quad,
+        age_s=fix.age_s,
+        rejected=0.0,
+        source=RECEIVER,
+        turning_accel=old.turning_accel,
     )
     reset_past_states(history, X_QUAD, 3, (x_quad[0], x_quad[1], x_quad[2], 0.0))
     reset_past_states(history, V_QUAD, 3, (v_quad[0], v_quad[1], v_quad[2], 0.0))

@@ -45,6 +45,7 @@ from autopilot.estimation.records import (
 from autopilot.estimation.tautness import LIFTING_S, SLACK_BELOW, slacken
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Vec3, add, axpy, dot, norm, scale, sub
+from autopilot.geometry.packed import with_field
 
 OUTLIER_BELOW = 0.8  # share of the cable length below which a short distance is an outlier, not a slack cable
 REJECTED_BELOW = 0.98  # share below which readings that the pendulum does not explain show a slack cable
@@ -74,26 +75,8 @@ def with_tracked_motion(
     load: LoadEstimate, x_load: Vec3, v_load: Vec3, cov: Covariance2, age_s: float
 ) -> LoadEstimate:
     """A tracked load where its separate filter places it; the direction follows with the next prediction."""
-    return LoadEstimate(
-        x_load,
-        v_load,
-        load.q_cable,
-        load.q_cable_dot,
-        load.across,
-        load.length,
-        cov,
-        load.taut,
-        load.tension,
-        load.pull,
-        load.pull_duration_s,
-        load.tautness_age_s,
-        age_s,
-        0.0,
-        TRACKER,
-        load.laid_height,
-        load.laid_height_var,
-        load.length_share,
-    )
+    load = with_field(with_field(load, "x_load", x_load), "v_load", v_load)
+    return load_with_status(with_field(load, "covariance", cov), age_s, 0.0, TRACKER)
 
 
 @kernel

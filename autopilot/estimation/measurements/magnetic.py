@@ -32,10 +32,10 @@ from autopilot.estimation.records import (
     EstimatorState,
     EstimatorTuning,
     History,
-    SensorErrors,
 )
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Vec3, apply, dot
+from autopilot.geometry.packed import with_field
 from autopilot.geometry.so3 import rotation_from_quat
 
 MIN_HORIZONTAL_SHARE = 0.05  # share of the field that must be horizontal to give a heading
@@ -50,24 +50,8 @@ def magnetic_north(declination: float) -> Vec3:
 @kernel
 def with_magnetic_reading(state: EstimatorState, field: Vec3, age: float) -> EstimatorState:
     """The state with the magnetometer's last reading."""
-    a = state.sensor_errors
-    return with_sensor_errors(
-        state,
-        SensorErrors(
-            a.mounting,
-            a.heading,
-            a.barometer,
-            a.gnss,
-            a.horizontal_slow_std,
-            a.vertical_slow_std,
-            a.reversion,
-            a.pending_correction,
-            field,
-            age,
-            a.barometer_age,
-            a.rejected,
-        ),
-    )
+    sensor_errors = with_field(with_field(state.sensor_errors, "field", field), "magnetic_age", age)
+    return with_sensor_errors(state, sensor_errors)
 
 
 @kernel

@@ -109,17 +109,17 @@ def start_from_pose(
         P[POSITION + i, VELOCITY + i] = age * velocity_var
         P[VELOCITY + i, POSITION + i] = age * velocity_var
     vehicle = VehicleEstimate(
-        pose.x_quad,
-        pose.v_quad if measured else ZERO,
-        pose.quat_wxyz,
-        old.omega_body,
-        old.gyro_bias,
-        old.accel_bias,
-        old.accel_quad,
-        age,
-        0.0,
-        TRACKER,
-        old.turning_accel,
+        x_quad=pose.x_quad,
+        v_quad=pose.v_quad if measured else ZERO,
+        quat_wxyz=pose.quat_wxyz,
+        omega_body=old.omega_body,
+        gyro_bias=old.gyro_bias,
+        accel_bias=old.accel_bias,
+        accel_quad=old.accel_quad,
+        age_s=age,
+        rejected=0.0,
+        source=TRACKER,
+        turning_accel=old.turning_accel,
     )
     v = vehicle.v_quad
     reset_past_states(history, X_QUAD, 3, (pose.x_quad[0], pose.x_quad[1], pose.x_quad[2], 0.0))

@@ -25,7 +25,6 @@ from autopilot.estimation.records import (
     EstimatorTuning,
     History,
     LoadEstimate,
-    SensorErrors,
 )
 from autopilot.estimation.tautness import (
     HELD_SIGMAS,
@@ -37,7 +36,7 @@ from autopilot.estimation.tautness import (
     load_vertical_var,
 )
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.linear import Vec3
+from autopilot.geometry.packed import with_field
 
 GROUND_LOAD_HEIGHT_STD = 0.02  # m, of the height of a load that a snap may lift by millimetres
 GROUND_LOAD_SPEED_STD = 0.05  # m/s, of its velocity
@@ -57,24 +56,6 @@ def _may_rest(load: LoadEstimate, history: History) -> bool:
     noise_var = GROUND_LOAD_SPEED_STD * GROUND_LOAD_SPEED_STD
     variance = load_vertical_var(load, history, VELOCITY + 2, RATE, 0.0, noise_var)
     return load.v_load[2] * load.v_load[2] <= HELD_SIGMAS * HELD_SIGMAS * variance
-
-
-@kernel
-def _with_pending_correction(a: SensorErrors, pending_correction: Vec3) -> SensorErrors:
-    return SensorErrors(
-        a.mounting,
-        a.heading,
-        a.barometer,
-        a.gnss,
-        a.horizontal_slow_std,
-        a.vertical_slow_std,
-        a.reversion,
-        pending_correction,
-        a.field,
-        a.magnetic_age,
-        a.barometer_age,
-        a.rejected,
-    )
 
 
 @kernel
@@ -136,7 +117,5 @@ def correct_tautening(
     fuse_scalars(history, count, n)
     state = inject_error(state, history)
     corrected = state.sensor_errors.pending_correction
-    return with_sensor_errors(
-        state,
-        _with_pending_correction(state.sensor_errors, (corrected[0], corrected[1], pending_correction[2])),
-    )
+    kept = (corrected[0], corrected[1], pending_correction[2])
+    return with_sensor_errors(state, with_field(state.sensor_errors, "pending_correction", kept))
