@@ -240,14 +240,9 @@ class Episodes:
         """The memory of the estimators before the first reading, for an autopilot whose law runs every second
         tick."""
         n = self.count
-        control = core.control
         weight = self.scenario.task.action.weight
         core.rows.commands[:, 0] = weight
-        pack(
-            control._replace(thrust=weight, observed=control.observed._replace(ground_force=0.0, stands=0.0)),
-            core.rows.control,
-            0,
-        )
+        pack(core.control._replace(thrust=weight), core.rows.control, 0)
         constants = unpack(CoreConstants, core.rows.constants, 0)
         pack(constants._replace(control_every=LAW_EVERY), core.rows.constants, 0)
         self._initial_rows = core.rows

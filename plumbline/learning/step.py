@@ -10,14 +10,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from autopilot.control.actuators.disturbance_observer import observe
 from autopilot.control.actuators.mixer import MixerResult, mix
 from autopilot.control.actuators.rotor_model import Actuation
 from autopilot.control.actuators.rotor_model import advance as actuate
-from autopilot.control.drag import UNKNOWN_FRAME_SHARE
-from autopilot.control.records import Reference, State, with_cable_length
+from autopilot.control.records import Reference, State
 from autopilot.control.thesis_cascade import ThesisMemory, load_position, start
-from autopilot.core.tick import ControlMemory, CoreConstants, CoreRows, EstimateSummary, Winch
+from autopilot.core.tick import ControlMemory, CoreConstants, CoreRows, EstimateSummary
 from autopilot.estimation.records import History
 from autopilot.geometry.kernel import kernel, nogil_kernel
 from autopilot.geometry.linear import E1, ZERO, Vec3, norm, scale, sub
@@ -135,27 +133,11 @@ def jet_at(reference: Any, row: int) -> Jet:
 
 @kernel
 def _update_actuation(estimators: EstimatorRows, i: int, mixed: MixerResult) -> None:
-    """Update what the autopilot assumes of rotors and disturbances after a command."""
+    """Update the rotors' thrust and moment that the estimator assumes after a command."""
     constants = unpack(CoreConstants, estimators.constants, 0)
-    control, summary = (
-        unpack(ControlMemory, estimators.control[i], 0),
-        unpack(EstimateSummary, estimators.summary[i], 0),
-    )
-    cable = unpack(Winch, estimators.winch, 0).cable
-    observed = observe(
-        control.observed,
-        summary.state,
-        1.0 if summary.taut else 0.0,
-        control.thrust,
-        control.moment,
-        constants.observer,
-        constants.drag,
-        with_cable_length(constants.vehicle, cable.length),
-        UNKNOWN_FRAME_SHARE,
-    )
+    control = unpack(ControlMemory, estimators.control[i], 0)
     actuation = Actuation(estimators.commands[i], control.thrust, control.moment)
     actuation = actuate(actuation, mixed.achieved_thrust, mixed.achieved_moment, constants.actuation)
-    control = with_field(with_field(control, "mixed", mixed), "observed", observed)
     control = with_field(with_field(control, "thrust", actuation.thrust), "moment", actuation.moment)
     pack(control, estimators.control[i], 0)
 
