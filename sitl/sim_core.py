@@ -11,7 +11,7 @@ from collections.abc import Callable
 import numpy as np
 
 from autopilot.geometry.entry import entry_point_of
-from autopilot.geometry.linear import ZERO, Vec3
+from autopilot.geometry.linear import Vec3
 from autopilot.geometry.packed import pack, unpack, width
 from autopilot.vehicle.layout import PLUS, Layout
 from sitl.plant.chain.records import lay_straight, new_chain
@@ -25,6 +25,7 @@ from sitl.world import (
     delivery_table,
     model_of,
     new_world,
+    pulse_at,
     world_tick,
 )
 
@@ -103,9 +104,8 @@ class SimCore:
     @property
     def pulse(self) -> Vec3:
         """The gust pulse that blows from this tick to the next."""
-        starts_us = self._pulse_at_us
-        is_active = starts_us >= 0 and starts_us <= self.now_us < starts_us + self.settings.pulse_for_us
-        return self.settings.pulse if is_active else ZERO
+        settings = self.settings
+        return pulse_at(self._pulse_at_us, settings.pulse_for_us, settings.pulse, self.now_us)
 
     @property
     def pulse_changes_us(self) -> int:

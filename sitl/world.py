@@ -11,12 +11,12 @@ therefore change neither the noise nor the drift of the readings that arrive.
 
 from __future__ import annotations
 
-from math import log
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from autopilot.geometry.jitable import jitable
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import ZERO, Vec3, add
 from autopilot.geometry.packed import Row, pack, packed, unpack, with_field
@@ -54,7 +54,7 @@ RATE, LOSS, OUTAGE_CHANCE, OUTAGE_S, JITTER, JITTER_MAX, STAMP_OFFSET, FAILS_AT,
 # columns of `queue`: when the reading leaves the sensor (us), its time stamp (us), then the reading
 DEPARTURE_US, STAMP_US, READING = 0, 1, 2
 _COLUMNS = 15
-_FATE_BLOCK, _OUTAGE_BLOCK, _JITTER_BLOCK = 15, 14, 13  # noise blocks; the sensors use those below
+_FATE_BLOCK, _OUTAGE_BLOCK, _JITTER_BLOCK = 15, 14, 13  # noise blocks of a sample that no sensor draws
 _PHASES = 6  # in the row of the inertial unit's errors: where the angles of the rotors begin
 _SPARE = 4  # entries of a queue beyond those that can be on their way
 _NEVER = 2**62
@@ -202,7 +202,7 @@ def _is_delivered(clock: Ints, delivery: Floats, noise: Noise) -> bool:
         return bool(works)
     lost, outage_draw = uniform(noise, _FATE_BLOCK)
     if clock[DUE] >= clock[OUTAGE_END] and outage_draw <= delivery[OUTAGE_CHANCE]:
-        length_s = -log(uniform(noise, _OUTAGE_BLOCK)[0]) * delivery[OUTAGE_S]
+        length_s = -logarithm(uniform(noise, _OUTAGE_BLOCK)[0]) * delivery[OUTAGE_S]
         clock[OUTAGE_END] = clock[DUE] + max(int(np.rint(length_s * 1000000)), 1)
     return bool(works and clock[DUE] >= clock[OUTAGE_END] and lost > delivery[LOSS])
 
@@ -260,12 +260,12 @@ def pop_arrived(sensor: int, now_us: int, rows: WorldRows) -> int:
     return int(head)
 
 
-@kernel
-def pulse_at(model: WorldModel, now_us: int) -> Vec3:
+@jitable
+def pulse_at(starts_us: int, for_us: int, pulse: Vec3, now_us: int) -> Vec3:
     """The gust pulse that blows from this tick to the next; it begins and ends at the first tick that is not
-    before its time."""
-    if model.pulse_at_us >= 0 and model.pulse_at_us <= now_us < model.pulse_at_us + model.pulse_for_us:
-        return model.pulse
+    before its time. A negative `starts_us`: never."""
+    if starts_us >= 0 and starts_us <= now_us < starts_us + for_us:
+        return pulse
     return ZERO
 
 
@@ -339,7 +339,8 @@ def world_tick(
         newest_command[1 + i] = forces[i]
     ring[1] += 1
     _set_rotor_shares(rotors, now_us >= model.rotors_fail_at_us)
-    wind, gust_now = add(model.wind, pulse_at(model, now_us)), world.gust
+    pulse = pulse_at(model.pulse_at_us, model.pulse_for_us, model.pulse, now_us)
+    wind, gust_now = add(model.wind, pulse), world.gust
     if model.gust_std != 0.0:
         normals = gaussian(Noise(rows.seed[0], GUSTS, world.tick, 1.0), 0)
         gust_now = gust(gust_now, model.gust_std, model.gust_tau_s, tick_s, normals)

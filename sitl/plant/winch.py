@@ -1,6 +1,6 @@
 """The winch: the length of the cable, from the commanded rate of the drum.
 
-The rate reaches the commanded one within a tick, or as fast as GREATEST_ACCEL allows; within a tick the
+The rate reaches the commanded one within a tick, or as fast as MAX_ACCEL allows; within a tick the
 length is a polynomial of degree two in time. The pull of the cable has no effect on the drum.
 """
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from autopilot.geometry.packed import unpack
+from sitl.plant.winch import MAX_ACCEL
 from sitl.world import World, WorldRows, world_tick
 
 G = 9.81
-GREATEST_ACCEL = 5.0  # m/s^2, of the drum
 FORCES = (2.0, 2.0, 2.0, 2.0)
 TICK_S = 0.004
 # free fall is a polynomial of degree two, which the integrator computes exactly except for roundings of 50 m
@@ -70,7 +70,7 @@ def test_a_load_hangs_on_the_cable_as_the_winch_has_it_and_falls_free_of_the_gri
         tick(rows, FORCES, False, 0.2)
     world = world_of(rows)
     # while the drum accelerates, its time counts half
-    length = 0.7 + 0.2 * (reeled * TICK_S - 0.5 * 0.2 / GREATEST_ACCEL)
+    length = 0.7 + 0.2 * (reeled * TICK_S - 0.5 * 0.2 / MAX_ACCEL)
     assert world.cable_length == pytest.approx(length, abs=1e-13)
     assert world.reel_rate == pytest.approx(0.2, abs=1e-15)
     plant = world.plant
@@ -84,7 +84,7 @@ def test_a_load_hangs_on_the_cable_as_the_winch_has_it_and_falls_free_of_the_gri
     assert after.released
     assert after.plant.tension == 0.0
     # nothing hangs on the cable: the drum stops, as fast as it accelerated
-    assert after.cable_length == pytest.approx(length + 0.5 * 0.2**2 / GREATEST_ACCEL, abs=1e-13)
+    assert after.cable_length == pytest.approx(length + 0.5 * 0.2**2 / MAX_ACCEL, abs=1e-13)
     assert after.reel_rate == 0.0
     expected = np.add(plant.x_load, np.multiply(plant.v_load, t)) - (0.0, 0.0, 0.5 * G * t * t)
     assert after.plant.x_load == pytest.approx(expected, abs=ROUNDING)
