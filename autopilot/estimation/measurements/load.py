@@ -80,9 +80,7 @@ def with_tracked_motion(
 
 
 @kernel
-def start_load(
-    state: EstimatorState, history: History, reading: LoadReading, tuning: EstimatorTuning
-) -> EstimatorState:
+def start_load(state: EstimatorState, history: History, reading: LoadReading) -> EstimatorState:
     """The load started at the reading, with a slack cable; the next prediction decides whether it is taut."""
     measured = reading.velocity_std >= 0.0
     age = reading.age_s
@@ -121,7 +119,7 @@ def reject_load(
     load = state.load
     distance = norm(sub(reading.x_load, state.vehicle.x_quad))
     if load.rejected + 1.0 >= REJECTIONS_BEFORE_RESET and distance < RESTART_DISTANCE * tuning.cable_length:
-        return start_load(state, history, reading, tuning)
+        return start_load(state, history, reading)
     if load.rejected + 1.0 == REJECTIONS_BEFORE_IMPACT:
         load = with_impact_uncertainty(load, history)
     return with_load(state, load_with_status(load, load.age_s, load.rejected + 1.0, TRACKER), state.resets)
@@ -184,7 +182,7 @@ def correct_load(
     state = with_capacity(state, reading.age_s, TRACKED_SIZE)
     load, n = state.load, state.size
     if load.source != TRACKER:
-        return start_load(state, history, reading, tuning)
+        return start_load(state, history, reading)
     if load.taut == 0.0:
         return correct_slack(state, history, reading, tuning)
     past = past_state(state, history, tuning, reading.age_s)
@@ -206,7 +204,7 @@ def correct_load(
             length = load.length / cable_length
             short = short or OUTLIER_BELOW < distance < MANY_REJECTIONS_BELOW * length
         if short and load.rejected + 1.0 >= SLACK_READINGS:
-            return start_load(state, history, reading, tuning)
+            return start_load(state, history, reading)
         return reject_load(state, history, reading, tuning)
     start_correction(history)
     velocity_var = reading.velocity_std * reading.velocity_std
