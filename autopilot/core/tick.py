@@ -20,9 +20,9 @@ from numba.extending import overload
 from autopilot.control.actuators.disturbance_observer import (
     DisturbanceEstimate,
     ObserverConstants,
-    cable_force,
     nominal_on_ground,
     observe,
+    part_along_cable,
     slowed_by_noise,
     with_extra_load,
     with_extra_weight,
@@ -217,14 +217,14 @@ def _jet(table: Array, at: int) -> Jet:
 
 
 @kernel
-def measured_pull(control: ControlMemory, state: State, extra_mass: float, constants: CoreConstants) -> float:
+def observed_pull(control: ControlMemory, state: State, extra_mass: float, constants: CoreConstants) -> float:
     """Pull of the cable on the vehicle (N): the force on it besides weight, rotors, drag and wind.
     `extra_mass` (kg) is the mass of the vehicle beyond the assumed one."""
     vehicle, a = constants.vehicle, state.a_quad
     specific_force = (a[0], a[1], a[2] + vehicle.gravity)
     known = axpy(control.thrust, column(state.R, 2), drag_force(state.v_quad, constants.drag))
     known = add(known, with_extra_weight(control.observed, extra_mass, vehicle).push)
-    return cable_force(
+    return part_along_cable(
         sub(scale(vehicle.quad_mass, specific_force), known), state.q_cable, column(state.R, 2)
     )
 
@@ -312,7 +312,7 @@ def update_estimate(rows: CoreRows, count: int, now_us: int, dt: float) -> None:
         estimator.load.taut > 0.0,
         estimator.load.source == TRACKER,
         tilt_angle(state.R),
-        measured_pull(control, state, learned_extra_mass(estimator, constants), constants),
+        observed_pull(control, state, learned_extra_mass(estimator, constants), constants),
         estimator.uncertainty.vertical if estimator.vehicle.source == RECEIVER else 0.0,
         problem,
         load_problem(estimator, constants.sensor_age_s),

@@ -62,7 +62,7 @@ from autopilot.wire.parameter_table import ParameterTable
 
 POSITION_STD_TO_FLY = 0.05  # m, with trackers
 FIX_STD_TO_FLY = 0.15  # m, beyond the deviation that a receiver states: margin for coasting or a float fix
-KNOWN_SPEED_STD = 2.0  # m/s, above that of any start: an impact leaves more
+SPEED_STD_TO_REPORT = 2.0  # m/s, above that of any start: an impact leaves more
 ATTITUDE_STD_TO_FLY = 0.05  # rad
 HEADING_STD_TO_FLY = 0.15  # rad, by a magnetometer
 # m and rad relative to the vehicle, of a load that no tracker measures: one of them is enough
@@ -316,7 +316,7 @@ def knows_attitude(state: EstimatorState, problem: int) -> bool:
 def knows_speed(state: EstimatorState) -> bool:
     """Whether the vehicle's velocity is known: an impact beyond the range of the accelerometer hides it until
     the next readings. Written so that NaN is not."""
-    return bool(state.uncertainty.speed <= KNOWN_SPEED_STD)
+    return bool(state.uncertainty.speed <= SPEED_STD_TO_REPORT)
 
 
 @kernel

@@ -276,7 +276,7 @@ def with_load_mass(vehicle: Vehicle, load_mass: float) -> Vehicle:
 
 
 @kernel
-def cable_force(force: Vec3, q: Vec3, direction: Vec3) -> float:
+def part_along_cable(force: Vec3, q: Vec3, direction: Vec3) -> float:
     """The cable's part of a force on the vehicle, N along q; the rest acts across `direction`."""
     return force_along_cable(dot(force, direction), q, direction)
 
@@ -316,10 +316,10 @@ def observe(
     ground_force += constants.contact * ((residual[2] if may_stand else 0.0) - ground_force)
     if taut > 0.0:
         direction = air_free_direction(column(state.R, 2), frame_share)
-        tension = cable_force(residual, q, direction)
+        tension = part_along_cable(residual, q, direction)
         pull = vehicle.cable_length * dot(state.q_cable_dot, state.q_cable_dot) - dot(q, specific_force)
         residual = axpy(-tension, q, residual)
-        shape_drag = axpy(-cable_force(shape_drag, q, direction), q, shape_drag)
+        shape_drag = axpy(-part_along_cable(shape_drag, q, direction), q, shape_drag)
         if not load_on_ground(observed, state) and pull > 0.0:
             mass_correlation += constants.mass * (tension * pull - mass_correlation)
             mass_square += constants.mass * (pull * pull - mass_square)
