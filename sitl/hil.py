@@ -23,7 +23,7 @@ from autopilot.wire.compiled import MAX_FRAME_BYTES, MAX_PAYLOAD_BYTES
 from autopilot.wire.convert.battery import BATTERY_PERIOD_US, BatteryReading, battery_status_message
 from autopilot.wire.convert.flight import wind_state_message
 from autopilot.wire.convert.geodesy import Home
-from autopilot.wire.convert.simulator import padded_forces, read_hil_actuator_controls
+from autopilot.wire.convert.simulator import SIMULATOR_COMPONENT, padded_forces, read_hil_actuator_controls
 from autopilot.wire.convert.telemetry import gps_global_origin_message
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.parameter_table import ParameterTable
@@ -37,7 +37,6 @@ from sitl.messages import (
     DIALECT_FRAMES,
     ENCODER,
     NO_READINGS,
-    SIMULATOR_COMPONENT,
     VEHICLE_SYSTEM,
     LatestReadings,
     MessageConstants,

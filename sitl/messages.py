@@ -18,6 +18,8 @@ from autopilot.wire.convert.simulator import (
     GYRO,
     MAG,
     PRESSURE,
+    SIMULATOR_COMPONENT,
+    SPEED_REPORT_US,
     TEMPERATURE,
     esc_status_values,
     forces_from_row,
@@ -67,12 +69,10 @@ from sitl.world import (
 from sitl.world import MAG as MAGNETOMETER
 
 VEHICLE_SYSTEM = 1
-SIMULATOR_COMPONENT = 26
 # sends the messages of our dialect: tools that do not know them would count their sequence numbers as losses
 DIALECT_COMPONENT = 27
 TRACKER, CAMERA, ENCODER = 0, 1, 2  # LOAD_SENSOR.sensor_id
 DIALECT_FRAMES = 2  # frames of our dialect that `put_truth` writes, after one of the common dialect
-ESC_PERIOD_US = 20_000  # period of the ticks at which the speed controllers report the speeds of the rotors
 _TRUTH = mavlink.PLUMBLINE_SOURCE_TRUTH
 _FLOAT, _NO_FIX = mavlink.GPS_FIX_TYPE_RTK_FLOAT, mavlink.GPS_FIX_TYPE_NO_FIX
 _UNKNOWN_M = 655.35  # UINT16_MAX cm: unknown
@@ -219,7 +219,7 @@ def put_sensors(
         at = _put(HIL_GPS, gnss, payload, buffer, at, sequence)
         sequence += 1
         reading = pop_arrived(GNSS, now_us, rows)
-    if now_us % ESC_PERIOD_US == 0:
+    if now_us % SPEED_REPORT_US == 0:
         for first in range(0, rows.rotor_table.shape[0], 4):
             at = _put(ESC_STATUS, _speeds(rows, first, now_us), payload, buffer, at, sequence)
             sequence += 1

@@ -7,18 +7,22 @@ from autopilot.control.actuators.disturbance_observer import (
     averaging_share,
     observer_constants,
 )
+from autopilot.control.actuators.mixer import LOST_COUNT
 from autopilot.control.actuators.rotor_model import ActuationConstants, actuation_constants
 from autopilot.control.design import Design, Requirements, Timing, design
 from autopilot.control.drag import Drag
 from autopilot.control.records import Vehicle
 from autopilot.vehicle.parameters import AutopilotParameters
 from autopilot.vehicle.rotors import mixer_table, thrust_and_moment_per_force
+from autopilot.wire.convert.simulator import SPEED_REPORT_US
 from autopilot.wire.parameter_table import ParameterTable
 
 # A rotor that is commanded its full force shows nothing of it until delay and lag have passed, and is judged
-# by three speeds, 60 ms. In this time t, the force expected of it may rise by less than a tenth of the full
-# force, from which on it is judged (`autopilot.core.tick.rotors_lost`): 1 - exp(-t / T) < 0.1 for T = 10 t.
-SPEED_REPORTS_S, ROTOR_WATCH_RATIO = 0.06, 10.0
+# by LOST_COUNT reported speeds. In this time t, the force expected of it may rise by less than a tenth of the
+# full force, from which on it is judged (`autopilot.core.tick.rotors_lost`): 1 - exp(-t / T) < 0.1 for
+# T = 10 t.
+ROTOR_WATCH_RATIO = 10.0
+SPEED_REPORTS_S = LOST_COUNT * SPEED_REPORT_US * 1e-6
 MAX_PUSH_SHARE = 0.7  # of the weight: bound of the estimated wind force
 
 

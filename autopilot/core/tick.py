@@ -32,6 +32,7 @@ from autopilot.control.actuators.lag_equalisation import equalise_lags
 from autopilot.control.actuators.mixer import (
     EXPECTED_FORCE,
     FORCE,
+    LOST_COUNT,
     MISSED_COUNT,
     REPORTED_SPEED,
     MixerResult,
@@ -98,7 +99,7 @@ NO_COMMAND = Command(0.0, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, 0.0, 0.0, ne
 STOPPED = MixerResult(0, 0.0, ZERO)
 # a rotor is lost if LOST_COUNT of its reported speeds in a row show that it gives less than LOST_SHARE of
 # the force that has long been commanded, reduced by SPEED_TOLERANCE of its greatest force
-LOST_SHARE, SPEED_TOLERANCE, LOST_COUNT = 0.3, 0.03, 3
+LOST_SHARE, SPEED_TOLERANCE = 0.3, 0.03
 
 _control_addresses: dict[type, int] = {}  # of `control_tick`, by the type of the law's rows
 

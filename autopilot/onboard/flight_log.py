@@ -17,6 +17,7 @@ from autopilot.onboard.log_topics import FAST, SLOW, Numbers, Sample
 from autopilot.services.files import LOG_FOLDER, LOG_NAME, LOG_SUFFIX, LOG_TIME, Path
 from autopilot.services.streams import NEVER_US
 from autopilot.wire import ulog
+from autopilot.wire.codec import FLOAT32_MAX
 from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.parameter_table import ParameterTable
 from autopilot.wire.periods import next_multiple
@@ -26,7 +27,6 @@ TAIL_US = 1_000_000  # for which the log continues after disarming
 SLOW_PERIOD_US = 1_000_000  # between two records of the slow topics
 MAX_WAITING_BYTES = 4 * 2**20  # bytes that the shell has not taken; beyond that, records are dropped
 MAX_EARLY_TEXTS = 20  # texts sent before arming with which the log begins
-_FLOAT32_MAX = 3.4028234663852886e38
 
 
 class LogChunk(NamedTuple):
@@ -252,4 +252,4 @@ def _utc(unix_s: int) -> str:
 
 
 def _clipped_to_float32(value: float) -> float:
-    return min(max(value, -_FLOAT32_MAX), _FLOAT32_MAX) if isinstance(value, float) else value
+    return min(max(value, -FLOAT32_MAX), FLOAT32_MAX) if isinstance(value, float) else value

@@ -21,13 +21,13 @@ from autopilot.geometry.packed import Row, packed, width
 from autopilot.onboard.log_topics import FAST, Column, Derived, Sample
 from autopilot.services.instant import Instant
 from autopilot.vehicle.layout import MAX_ROTORS
+from autopilot.wire.codec import FLOAT32_MAX
 from autopilot.wire.compiled import Bytes
 from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.ulog import RECORD_HEAD, UlogWriter
 
 _PULSE_MIN_US, _PULSE_MAX_US = 1000.0, 2000.0  # actuator_outputs, us
-_FLOAT32_MAX = 3.4028234663852886e38
 _SENSOR_COMBINED = next(i for i, (topic, _) in enumerate(FAST) if topic.name == "sensor_combined")
 _FLOAT, _DOUBLE = -4, -8  # kinds of numbers; integers: their bytes
 
@@ -118,7 +118,7 @@ def put_sample(
         if size == _FLOAT:
             floats[0] = number
             if isinf(floats[0]) and not isinf(number):
-                floats[0] = _FLOAT32_MAX if number > 0.0 else -_FLOAT32_MAX
+                floats[0] = FLOAT32_MAX if number > 0.0 else -FLOAT32_MAX
             size = 4
         elif size == _DOUBLE:
             doubles[0] = number

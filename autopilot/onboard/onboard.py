@@ -50,7 +50,7 @@ from autopilot.onboard.path_work import (
     use_paths,
 )
 from autopilot.onboard.punctuality import Punctuality
-from autopilot.onboard.simulator_parameters import SIMULATOR_COMPONENT, SimulatorParameters
+from autopilot.onboard.simulator_parameters import SimulatorParameters
 from autopilot.onboard.snapshot import (
     BATTERY_TIMEOUT_US,
     CoreSnapshot,
@@ -116,6 +116,7 @@ from autopilot.wire.codec import FrameWriter, layout_of
 from autopilot.wire.compiled import MAX_FRAME_BYTES, MAX_PAYLOAD_BYTES
 from autopilot.wire.convert.battery import NO_READING, BatteryReading, read_battery_status
 from autopilot.wire.convert.geodesy import Home, enu_from_geodetic
+from autopilot.wire.convert.simulator import SIMULATOR_COMPONENT
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import WireItem, endless_loops, read_items, unflown_items
 from autopilot.wire.periods import next_multiple
@@ -123,7 +124,7 @@ from autopilot.wire.signing import Signing
 from autopilot.wire.statustext import TextReader, listed
 from missions.model import Land, ReturnHome, Signals, Term, Waypoint
 
-GROUND_WINDOW_US = 20_000
+GROUND_WINDOW_US = 20_000  # in lockstep: time between two turns of the ground station
 SIMULATOR_SYSTEM = 1  # our system id on the simulator link, whatever MAV_SYS_ID ground stations see
 # asks whether the ground has caught up: separate, since no log has its messages and gaps would be noticed
 LOCKSTEP_COMPONENT = mavlink.MAV_COMP_ID_SYSTEM_CONTROL

@@ -13,10 +13,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from autopilot.services.records import Peer
+from autopilot.wire.convert.simulator import SIMULATOR_COMPONENT
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.parameter_table import Parameter, ParameterTable, decimal_from_float32
 
-SIMULATOR_COMPONENT = 26
 RETRY_US = 500_000
 MAX_LIST_REQUESTS = 6  # requests, after which a silent simulator is assumed to have no parameters
 _MAX_VALUE = 1e9

@@ -12,10 +12,10 @@ from typing import Any
 from autopilot.services.identity import Identity
 from autopilot.services.snapshot import Snapshot
 from autopilot.wire.convert.scaling import saturated
+from autopilot.wire.convert.simulator import SPEED_REPORT_US
 from autopilot.wire.dialect import plumbline as mavlink
 
 _GROUP = 4  # rotors in a message
-_REPORT_INTERVAL_US = 20_000  # interval at which the controllers report their speeds
 _DSHOT = 5  # ESC_CONNECTION_TYPE
 _STUCK = 32  # ESC_FAILURE_FLAGS: the motor is commanded to turn but stands
 _UNKNOWN_TEMPERATURE = 0x7FFF
@@ -56,7 +56,7 @@ def esc_info(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
         mavlink.MAVLink_esc_info_message(
             index=first,
             time_usec=s.now_us,
-            counter=s.now_us // _REPORT_INTERVAL_US & 0xFFFF,
+            counter=s.now_us // SPEED_REPORT_US & 0xFFFF,
             count=s.rotors,
             connection_type=_DSHOT,
             info=(1 << min(_GROUP, s.rotors - first)) - 1,

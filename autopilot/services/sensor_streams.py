@@ -15,7 +15,7 @@ from autopilot.services.instant import attitude_quaternion_of, pulses_of
 from autopilot.services.snapshot import SensorReadings, Snapshot
 from autopilot.wire.codec import layout_of
 from autopilot.wire.convert.axes import frd_from_flu, ned_from_enu
-from autopilot.wire.convert.scaling import saturated
+from autopilot.wire.convert.scaling import STANDARD_GRAVITY, saturated
 from autopilot.wire.convert.telemetry import boot_ms
 from autopilot.wire.dialect import plumbline as mavlink
 
@@ -27,7 +27,6 @@ _ACTUATOR_OUTPUT_STATUS = layout_of(mavlink.MAVLink_actuator_output_status_messa
 _UINT16, _INT16 = 0xFFFF, 0x7FFF
 _CHANNELS = 18  # of RC_CHANNELS
 _OUTPUTS = 32  # of ACTUATOR_OUTPUT_STATUS
-_STANDARD_GRAVITY = 9.80665  # m/s^2, for milli-g
 # HIGHRES_IMU.fields_updated
 _INERTIAL, _FIELD, _PRESSURE = 0x003F, 0x01C0, 0x1A00
 _UPDATED_US = 20_000  # a slower sensor is "updated" if it read within the default interval of HIGHRES_IMU
@@ -77,7 +76,7 @@ def scaled_imu(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
     if readings is None:
         return ()
     fields = (
-        *(_within(a, 1e3 / _STANDARD_GRAVITY) for a in frd_from_flu(readings.accel)),
+        *(_within(a, 1e3 / STANDARD_GRAVITY) for a in frd_from_flu(readings.accel)),
         *(_within(w, 1e3) for w in frd_from_flu(readings.gyro)),
         *(_within(b, 1e3) for b in frd_from_flu(readings.field_gauss)),
     )

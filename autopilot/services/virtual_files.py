@@ -17,6 +17,7 @@ from autopilot.services.file_tree import FileGenerator, checksum
 from autopilot.services.files import Path
 from autopilot.services.identity import Identity
 from autopilot.services.mission_store import StoredMission
+from autopilot.wire.codec import within_float32
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import WireItem
 from autopilot.wire.parameter_table import ParameterTable
@@ -33,7 +34,6 @@ _HEADER = struct.Struct("<HHH")
 _MISSION_MAGIC = 0x763D
 _MISSION_HEADER = struct.Struct("<5H")
 _ITEM = struct.Struct("<ffffiifHHBBBBBB")  # MISSION_ITEM_INT as it is transferred
-_FLOAT32_MAX = 3.4028234663852886e38
 _PARAMETER_METADATA = 1  # COMP_METADATA_TYPE
 
 
@@ -62,7 +62,7 @@ def _packed(table: ParameterTable, defaults: bool, start: int, count: int, integ
         numbers = (value, default) if flags else (value,)
         kind, letter = (_INT32_TYPE, "i") if integers and table.describe(text).integer else (_FLOAT_TYPE, "f")
         packed.append(bytes((kind | flags, common | (len(rest) - 1) << 4)) + rest)
-        encoded = map(round if letter == "i" else _within_float32, numbers)
+        encoded = map(round if letter == "i" else within_float32, numbers)
         packed.append(struct.pack(f"<{len(numbers)}{letter}", *encoded))
         previous = name
     return b"".join(packed)
@@ -187,7 +187,3 @@ def _common_length(a: bytes, b: bytes) -> int:
 
 def _as_integer(text: str | None, default: int) -> int:
     return int(text) if text is not None and text.isascii() and text.isdigit() else default
-
-
-def _within_float32(value: float) -> float:
-    return math.copysign(math.inf, value) if abs(value) > _FLOAT32_MAX else value

@@ -30,7 +30,7 @@ MAX_FRAME_BYTES = _HEADER_V2 + 255 + _CRC + _SIGNATURE
 _SIGNED = 0x01  # the only incompatibility flag that is defined
 
 _HEADER2 = struct.Struct("<BBBBBBBHB")  # the MAVLink 2 header; the message id is 24 bits, low part first
-_FLOAT32_MAX = 3.4028234663852886e38
+FLOAT32_MAX = 3.4028234663852886e38
 
 
 class Layout:
@@ -136,8 +136,9 @@ def layout_of(message_type: Any) -> Layout:
     return _BY_TYPE[message_type]
 
 
-def _within_float32(value: Any) -> Any:
-    if isinstance(value, float) and math.isfinite(value) and abs(value) > _FLOAT32_MAX:
+def within_float32(value: Any) -> Any:
+    """The value as a float field holds it: one that is too large becomes infinite."""
+    if isinstance(value, float) and math.isfinite(value) and abs(value) > FLOAT32_MAX:
         return math.copysign(math.inf, value)
     return value
 
@@ -171,7 +172,7 @@ class FrameWriter:
         try:
             body = layout.pack(*head, *values, extra)
         except OverflowError:  # a float beyond float32
-            body = layout.pack(*head, *map(_within_float32, values), extra)
+            body = layout.pack(*head, *map(within_float32, values), extra)
         if not body[-2]:
             kept = body[_HEADER_V2 - 1 : -1].rstrip(b"\0") or b"\0"
             body = b"%c%b%b%c" % (len(kept), body[1 : _HEADER_V2 - 1], kept, extra)

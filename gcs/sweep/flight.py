@@ -21,7 +21,7 @@ from autopilot.geometry.entry import entry_point_of
 from autopilot.geometry.packed import field_offset, pack, packed, unpack
 from autopilot.guidance.jet_table import COLUMNS, flies_requested_path, jets
 from autopilot.guidance.legs import LOAD_POSITION
-from autopilot.onboard.onboard import Onboard
+from autopilot.onboard.onboard import GROUND_WINDOW_US, Onboard
 from autopilot.onboard.path_work import path_work, use_paths
 from autopilot.services.requests import Arm, StartMission
 from autopilot.supervisor.mission import with_plan
@@ -51,7 +51,6 @@ from sitl.plant.drive import share_left
 from sitl.plant.records import PlantState
 from sitl.world import Floats, World, new_world
 
-GROUND_WINDOW_US = 20_000  # between two turns of the ground station in lockstep
 TRACE_COLUMNS = 14
 _NO_ROWS = np.zeros((0, COLUMNS))
 _NO_PATH = np.zeros((1, COLUMNS))  # requested path of a mission step in which the load follows none

@@ -30,8 +30,8 @@ from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.geometry.packed import Row, pack
 from autopilot.wire.convert.geodesy import EARTH_RADIUS_M, Home
 from autopilot.wire.convert.scaling import saturated
-from autopilot.wire.convert.simulator import REEL_MAX, ROTOR_FMAX
-from sitl.messages import ESC_PERIOD_US, rotor_speed
+from autopilot.wire.convert.simulator import REEL_MAX, ROTOR_FMAX, SPEED_REPORT_US
+from sitl.messages import rotor_speed
 from sitl.plant.rotors import REQUESTED
 from sitl.sensors.gnss import FIXED, LOST
 from sitl.sensors.profile import Profile, reported_std
@@ -194,7 +194,7 @@ def deliver_readings(rows: WorldRows, now_us: int, wire: Wire, inbox: Array) -> 
         for i in range(3):
             inbox[count, box.READING + i] = to_single(rows.queue[MAG, newest, READING + i])
         count += 1
-    if now_us % ESC_PERIOD_US == 0:
+    if now_us % SPEED_REPORT_US == 0:
         for first in range(0, rows.rotor_table.shape[0], 4):
             inbox[count, box.KIND] = box.ROTOR_SPEEDS
             inbox[count, box.READING] = first

@@ -13,6 +13,7 @@ from autopilot.own.source import OwnError
 from autopilot.vehicle.file import load_truth_and_belief, load_vehicle
 from autopilot.vehicle.parameters import apply_settings, autopilot_parameters
 from autopilot.vehicle.rates import RateError, control_divider
+from autopilot.wire.convert.scaling import STANDARD_GRAVITY
 from autopilot.wire.parameter_names import unknown_parameter_text
 from autopilot.wire.parameter_table import ParameterError, ParameterTable
 from gcs.errors import InputError, input_error
@@ -24,7 +25,7 @@ from sitl.vehicles.sim_parameters import sim_parameters
 from sitl.vehicles.truth import truth_of
 
 _MAX_THRUST_RATIO = 20.0  # thrust over weight; racing multirotors without a load have up to 15
-_G_N = 9.80665e-3  # weight of a gram
+_G_N = 1e-3 * STANDARD_GRAVITY  # weight of a gram
 _MIN_HOVER_W_KG = 60.0  # rotors that are large for their load need 70, those of usual vehicles 100 to 250
 
 

@@ -11,11 +11,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from autopilot.wire.codec import FrameWriter, decode
-from autopilot.wire.convert.simulator import ACCEL, GYRO, MAG
+from autopilot.wire.convert.simulator import ACCEL, GYRO, MAG, SIMULATOR_COMPONENT
 from autopilot.wire.dialect import plumbline as mavlink
 from sitl.hil import HilSimulator
 from sitl.interfaces.frame import Frame
-from sitl.messages import SIMULATOR_COMPONENT, VEHICLE_SYSTEM
+from sitl.messages import VEHICLE_SYSTEM
 
 RATE_HZ = 250
 MOTORS = 4

@@ -18,10 +18,11 @@ from autopilot.shell.options import (
     set_timeout,
 )
 from autopilot.wire.codec import FrameWriter
+from autopilot.wire.convert.simulator import SIMULATOR_COMPONENT
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.periods import next_multiple
 from sitl.hil import HilSimulator
-from sitl.messages import SIMULATOR_COMPONENT, VEHICLE_SYSTEM
+from sitl.messages import VEHICLE_SYSTEM
 
 _TAKEOVER_SILENCE_S = 0.5  # silence of the autopilot that is served, after which another may take its place
 _MAX_REPORTED = 8  # of the refused autopilots

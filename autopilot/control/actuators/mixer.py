@@ -51,6 +51,7 @@ Array = NDArray[np.float64]
 
 # rows of the rotors' memory, one column per rotor
 FORCE, EFFORT, DIRECTION, EXPECTED_FORCE, MISSED_COUNT, ASSUMED_FORCE, REPORTED_SPEED = range(7)
+LOST_COUNT = 3  # reported speeds in a row, each too low, from which on a rotor counts as lost
 _ROUNDING = 1e-9  # N: a bound on less than this is rounding
 
 

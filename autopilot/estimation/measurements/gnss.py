@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from math import sqrt
 
+from autopilot.estimation.cable_pull import MIN_CARRYING_SHARE
 from autopilot.estimation.correction import (
     PastState,
     add_position_jacobian,
@@ -87,7 +88,6 @@ CLIMB_STD_RATIO = 1.7  # deviation of the climb over that of the horizontal spee
 GROUND_HEIGHT_STD = 0.02  # m, of the height of a vehicle on the ground
 INITIAL_SPEED_STD = 0.2  # m/s
 # of a vehicle that is found in the air
-AIRBORNE_THRUST_SHARE = 0.5  # of its weight: above this thrust, the rotors carry it
 SUSPENDED_PULL_SHARE = 0.5  # of the load's weight that must pull at the vehicle for the load to hang from it
 AIRBORNE_SPEED_STD = 1.0  # m/s
 AIRBORNE_TILT_STD = 0.15  # rad, by which acceleration tilts the measured vertical
@@ -212,7 +212,7 @@ def initial_load(
     """The load when a vehicle starts with its rotors giving `thrust` (N): it is ahead of a vehicle on the
     ground, is suspended from one that accelerates less than its rotors would make it, and otherwise is on
     the ground below it."""
-    if not thrust > AIRBORNE_THRUST_SHARE * tuning.quad_mass * tuning.gravity:
+    if not thrust > MIN_CARRYING_SHARE * tuning.quad_mass * tuning.gravity:
         return load_ahead(state, tuning)
     pull = thrust - tuning.quad_mass * state.last_imu.accel[2]
     if pull > SUSPENDED_PULL_SHARE * tuning.load_mass * tuning.gravity:
@@ -228,7 +228,7 @@ def start_from_fix(
     correction gives; also of a vehicle that slides over the ground, whose acceleration looked like a tilt as
     long as it was assumed to rest. `thrust` in N."""
     old, accel, g = state.vehicle, state.last_imu.accel, tuning.gravity
-    airborne = thrust > AIRBORNE_THRUST_SHARE * tuning.quad_mass * g
+    airborne = thrust > MIN_CARRYING_SHARE * tuning.quad_mass * g
     speed_var = AIRBORNE_SPEED_STD * AIRBORNE_SPEED_STD if airborne else INITIAL_SPEED_STD * INITIAL_SPEED_STD
     R = attitude_from_vectors(accel, state.sensor_errors.field, magnetic_north(tuning.declination))
     quat = quat_from_rotation(R)

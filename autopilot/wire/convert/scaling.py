@@ -1,10 +1,13 @@
-"""Integers on the wire: rounded, saturated at the ends of the field's range; nothing is ever raised."""
+"""Numbers on the wire: the unit of accelerations, and integers, rounded and saturated at the ends of the
+field's range; nothing is ever raised."""
 
 from __future__ import annotations
 
 import math
 
 from autopilot.geometry.jitable import jitable
+
+STANDARD_GRAVITY = 9.80665  # m/s^2: accelerations are sent in thousandths of it, weights in kg
 
 
 @jitable

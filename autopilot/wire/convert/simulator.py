@@ -29,7 +29,7 @@ from autopilot.geometry.linear import Vec3
 from autopilot.geometry.packed import Row
 from autopilot.geometry.so3 import Quat
 from autopilot.wire.convert.geodesy import Home, enu_from_geodetic, geodetic_from_enu
-from autopilot.wire.convert.scaling import course_cdeg, int16, saturated, uint16
+from autopilot.wire.convert.scaling import STANDARD_GRAVITY, course_cdeg, int16, saturated, uint16
 from autopilot.wire.dialect import plumbline as mavlink
 
 # of each rotor, in N; rotors that a vehicle does not have: 0
@@ -40,7 +40,8 @@ Forces = tuple[
 NO_FORCES: Forces = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 FULL_SPEED_RPM = 10_000.0  # of a rotor at its greatest force, whatever its size
 ROTOR_FMAX = 1.96  # N, force of one rotor at full scale of HIL_ACTUATOR_CONTROLS (Table 4-1)
-STANDARD_GRAVITY = 9.80665  # m/s^2, the g of HIL_STATE_QUATERNION's accelerations
+SIMULATOR_COMPONENT = 26  # sends the messages of the common dialect
+SPEED_REPORT_US = 20_000  # period of the ticks at which the speed controllers report the speeds of the rotors
 
 ACCEL, GYRO, MAG = 0x7, 0x38, 0x1C0  # HIL_SENSOR.fields_updated
 PRESSURE, TEMPERATURE = 0xA00, 0x1000

@@ -22,14 +22,13 @@ from autopilot.geometry.so3 import Quat
 from autopilot.wire.codec import Fields, layout_of
 from autopilot.wire.convert.axes import frd_from_flu, ned_from_enu
 from autopilot.wire.convert.geodesy import Home, geodetic_from_enu
-from autopilot.wire.convert.scaling import course_cdeg, int16, int32, saturated, uint16
+from autopilot.wire.convert.scaling import STANDARD_GRAVITY, course_cdeg, int16, int32, saturated, uint16
 from autopilot.wire.dialect import plumbline as mavlink
 
 _UPRIGHT: Quat = (1.0, 0.0, 0.0, 0.0)
 _NO_OFFSET: Quat = (0.0, 0.0, 0.0, 0.0)  # ATTITUDE_QUATERNION.repr_offset_q: none is given
 _NO_HEADING = 0xFFFF
 _UINT32 = 0xFFFFFFFF
-_STANDARD_GRAVITY = 9.80665  # m/s^2
 # GPS_RAW_INT: the dilutions HDOP and VDOP, which PX4's simulated receiver states: no satellites are modelled
 _DILUTIONS, _NO_DILUTIONS = (70, 110), (0xFFFF, 0xFFFF)
 _NO_ACCURACIES = (0, 0, 0)  # GPS_RAW_INT: of speed and heading, and the heading itself
@@ -327,7 +326,7 @@ def winch_status_message(
         now_us,
         cable_length,
         rate,
-        tension / _STANDARD_GRAVITY,
+        tension / STANDARD_GRAVITY,
         math.nan,
         math.nan,
         mavlink.MAV_WINCH_STATUS_HEALTHY | moving | abandoned,
