@@ -26,16 +26,9 @@ from autopilot.estimation.records import (
 from autopilot.geometry.packed import unpack
 from autopilot.wire.codec import FrameWriter, decode
 from autopilot.wire.convert.geodesy import Home
-from autopilot.wire.convert.simulator import (
-    MAG,
-    PRESSURE,
-    HilGps,
-    hil_gps_message,
-    hil_sensor_message,
-    load_sensor_message,
-    odometry_message,
-)
+from autopilot.wire.convert.simulator import MAG, PRESSURE, HilGps
 from autopilot.wire.dialect import plumbline as mavlink
+from tests.doubles.messages import hil_gps_message, hil_sensor_message, load_sensor_message, odometry_message
 
 HOME = Home()
 NOW_US = 1_000_000
@@ -105,19 +98,22 @@ def record(tick: Read, kind: int) -> tuple[int, object]:
     return shows_us, found
 
 
+NO_VECTOR = (math.nan, math.nan, math.nan)
 POSE = WRITER.frame(
     odometry_message(
-        NOW_US - 4000, (1.0, 2.0, 3.0), (0.6, 0.0, 0.0, 0.8), (0.1, 0.2, 0.3), None, 1e-3, 2e-3, 3e-3
+        NOW_US - 4000, (1.0, 2.0, 3.0), (0.6, 0.0, 0.0, 0.8), (0.1, 0.2, 0.3), NO_VECTOR, 1e-3, 2e-3, 3e-3
     )
 )
 STILL_POSE = WRITER.frame(
-    odometry_message(NOW_US, (1.0, 2.0, 3.0), (0.6, 0.0, 0.0, 0.8), None, None, 1e-3, 2e-3, math.nan)
+    odometry_message(
+        NOW_US, (1.0, 2.0, 3.0), (0.6, 0.0, 0.0, 0.8), NO_VECTOR, NO_VECTOR, 1e-3, 2e-3, math.nan
+    )
 )
 TRACKED_LOAD = WRITER.frame(
-    load_sensor_message(NOW_US - 8000, (1.0, 2.0, 0.5), (0.1, 0.2, 0.3), None, 1e-3, 2e-3, math.nan)
+    load_sensor_message(NOW_US - 8000, (1.0, 2.0, 0.5), (0.1, 0.2, 0.3), NO_VECTOR, 1e-3, 2e-3, math.nan)
 )
 SEEN_LOAD = WRITER.frame(
-    load_sensor_message(NOW_US - 12_000, None, None, (0.0, 0.6, -0.8), math.nan, math.nan, 0.01, 1)
+    load_sensor_message(NOW_US - 12_000, NO_VECTOR, NO_VECTOR, (0.0, 0.6, -0.8), math.nan, math.nan, 0.01, 1)
 )
 HEARTBEAT = WRITER.frame(mavlink.MAVLink_heartbeat_message(2, 12, 0, 0, 3, 3))
 

@@ -19,7 +19,7 @@ from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.parameters import BENCH_MEASURED, autopilot_parameters
 from autopilot.wire.codec import FrameWriter, decode
 from autopilot.wire.convert.geodesy import Home, geodetic_from_enu
-from autopilot.wire.convert.simulator import hil_sensor_message, read_hil_actuator_controls, read_hil_sensor
+from autopilot.wire.convert.simulator import read_hil_actuator_controls, read_hil_sensor
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import WireItem
 from gcs.closed_loop import Conditions, build_onboard
@@ -28,6 +28,7 @@ from sitl.hil import HilSimulator
 from sitl.vehicles.sim_parameters import sim_parameters
 from sitl.vehicles.truth import load_truth
 from tests.doubles.craft import ACCEPTED, GCS, Craft, at_phase
+from tests.doubles.messages import hil_sensor_message
 from tests.doubles.motion import TICK_S
 
 DENIED = mavlink.MAV_RESULT_DENIED

@@ -9,7 +9,7 @@ import pytest
 
 from autopilot.geometry.packed import unpack
 from autopilot.wire.codec import FrameWriter, decode
-from autopilot.wire.convert.simulator import hil_actuator_controls_message, padded_forces
+from autopilot.wire.convert.simulator import padded_forces
 from sitl.hil import HilSimulator
 from sitl.plant.step import initial_state
 from sitl.sensors.files import load_profile, parse_profile
@@ -18,6 +18,7 @@ from sitl.sim_core import SimCore
 from sitl.vehicles.sim_parameters import apply, sim_parameters
 from sitl.vehicles.truth import load_truth
 from sitl.world import FITTED, READING, READINGS, SENSORS, STAMP_US, pop_arrived
+from tests.doubles.messages import hil_actuator_controls_message
 
 Forces = tuple[float, float, float, float]
 

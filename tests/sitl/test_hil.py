@@ -8,26 +8,27 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from autopilot.geometry.frames import enu_from_ned
 from autopilot.wire.codec import FrameWriter
 from autopilot.wire.convert.battery import read_battery_status
-from autopilot.wire.convert.flight import read_load_state, read_rotor_state, read_wind_state
+from autopilot.wire.convert.flight import read_load_state
 from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.convert.simulator import (
     ACCEL,
     GYRO,
     MAG,
     PRESSURE,
-    hil_actuator_controls_message,
+    load_sensor_record,
+    odometry_record,
     padded_forces,
     read_hil_gps,
     read_hil_state_quaternion,
-    read_load_sensor,
-    read_odometry,
     rotor_speed_rpm,
 )
 from autopilot.wire.dialect import plumbline as mavlink
 from sitl.hil import COMMAND_TIMEOUT_US, HilSimulator, PacingFigures
 from sitl.messages import pressure_pa
+from tests.doubles.messages import hil_actuator_controls_message
 
 VEHICLES = "bebop, bebop-real, heavy, heavy-real, hexarotor, iris, octorotor, thesis"
 PROFILES = ["field", "gps", "ideal", "lab", "lab-blind", "lab-real", "rtk", "rtk-blind"]
@@ -70,15 +71,15 @@ def test_ideal_sends_everything_at_every_tick(answerer, messages) -> None:
     answerer((1.3, 1.31, 1.32, 1.33)).fly(simulator, 200)
     odometry, load, speeds, inertial = messages(simulator.sensor_datagram())
     state = simulator.core.state
-    pose = read_odometry(odometry)
+    pose = odometry_record(odometry)
     assert pose.position == pytest.approx(state.x_quad, abs=FLOAT32_M)
     assert pose.velocity == pytest.approx(state.v_quad, abs=FLOAT32_M)
     assert pose.omega_body == pytest.approx(state.omega_body, abs=FLOAT32_M)
     assert pose.position_std == pytest.approx(1e-4)  # stated although there is no noise
-    tracked = read_load_sensor(load)
+    tracked = load_sensor_record(load)
     assert tracked.position == pytest.approx(state.x_load, abs=FLOAT32_M)
     assert tracked.velocity == pytest.approx(state.v_load, abs=FLOAT32_M)
-    assert tracked.direction_body is None
+    assert all(map(isnan, tracked.direction_body))
     assert tracked.velocity_std == pytest.approx(1e-3)
     assert odometry.time_usec == load.time_usec == speeds.time_usec == simulator.now_us
     greatest = simulator.core.truth.rotor_max
@@ -98,8 +99,8 @@ def test_lab_sends_poses_without_velocities(answerer, messages) -> None:
     assert [m.time_usec for m in poses] == [m.time_usec for m in loads] == list(range(0, 992_001, 5000))
     assert all(isnan(m.velocity_covariance[0]) and isnan(m.vx) for m in poses)
     assert {m.fields for m in loads} == {mavlink.PLUMBLINE_LOAD_POSITION}
-    assert read_odometry(poses[0]).position_std == pytest.approx(1e-3)
-    assert read_odometry(poses[0]).attitude_std == pytest.approx(7e-4)
+    assert odometry_record(poses[0]).position_std == pytest.approx(1e-3)
+    assert odometry_record(poses[0]).attitude_std == pytest.approx(7e-4)
 
 
 @pytest.mark.parametrize(
@@ -162,7 +163,7 @@ def test_truth_is_the_truth(answerer, messages) -> None:
     rebuilt = [x - got.distance * q for x, q in zip(got.x_load, got.q_cable, strict=True)]
     assert rebuilt == pytest.approx(state.x_quad, abs=4.0 * FLOAT32_M)
     assert read_hil_state_quaternion(vehicle, Home()).position == pytest.approx(state.x_quad, abs=0.01)
-    assert read_rotor_state(rotors).forces[:4] == pytest.approx(simulator.core.rotor_force, abs=FLOAT32_M)
+    assert rotors.force == pytest.approx(simulator.core.rotor_force, abs=FLOAT32_M)
     assert (rotors.saturated, rotors.force_max) == (0b1000, pytest.approx(1.96))
     assert status.time_usec == simulator.now_us
     assert (status.vehicle_on_ground, status.load_on_ground) == (
@@ -290,7 +291,8 @@ def told_winds(simulator: HilSimulator, answerer, messages, ticks: int) -> list[
     for datagram in answerer().fly(simulator, ticks):
         for message in messages(datagram):
             if message.get_type() == "WIND_STATE":
-                winds.append(tuple(read_wind_state(message)))
+                east_north_up = (enu_from_ned(tuple(one)) for one in (message.wind, message.gust))
+                winds.append((message.time_usec, *east_north_up))
     return winds
 
 

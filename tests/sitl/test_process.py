@@ -14,9 +14,10 @@ from collections.abc import Iterator
 import pytest
 
 from autopilot.wire.codec import FrameWriter, decode
-from autopilot.wire.convert.simulator import hil_actuator_controls_message, padded_forces
+from autopilot.wire.convert.simulator import padded_forces
 from autopilot.wire.dialect import plumbline as mavlink
 from gcs.shell.link import free_port
+from tests.doubles.messages import hil_actuator_controls_message
 
 PATIENCE_S = 30.0  # the first start compiles
 

@@ -11,11 +11,12 @@ from numba import config
 
 from autopilot.shell.machine_sockets import SUPPORTED
 from autopilot.wire.codec import FrameWriter
-from autopilot.wire.convert.simulator import hil_actuator_controls_message, padded_forces
+from autopilot.wire.convert.simulator import padded_forces
 from gcs.shell.link import LOOPBACK, free_port
 from sitl.hil import HilSimulator
 from sitl.shell.link import TRUTH_WINDOW_US, Link
 from sitl.shell.tick_loop import TickLoop
+from tests.doubles.messages import hil_actuator_controls_message
 
 pytestmark = pytest.mark.skipif(
     not SUPPORTED or bool(config.DISABLE_JIT), reason="without machine code all of it is Python"

@@ -12,8 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from autopilot.wire.codec import MAX_FRAME_BYTES, FrameWriter, Received, decode
-from autopilot.wire.convert.simulator import ACCEL, GYRO, hil_sensor_message
+from autopilot.wire.convert.simulator import ACCEL, GYRO
 from autopilot.wire.dialect import plumbline as mavlink
+from tests.doubles.messages import hil_sensor_message
 
 CLASSES = sorted(mavlink.mavlink_map.values(), key=lambda message_type: message_type.msgname)
 SAMPLES = 12  # random messages of each class

@@ -25,8 +25,9 @@ from autopilot.wire.compiled import (
     unpack_payload,
     wire_record,
 )
-from autopilot.wire.convert.simulator import hil_actuator_controls_message, read_hil_actuator_controls
+from autopilot.wire.convert.simulator import read_hil_actuator_controls
 from autopilot.wire.dialect import plumbline as mavlink
+from tests.doubles.messages import hil_actuator_controls_message
 
 KINDS = (
     "HIL_SENSOR",

@@ -6,7 +6,7 @@ import math
 import struct
 from collections.abc import Callable
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -14,23 +14,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from autopilot.geometry.frames import enu_from_ned, flu_from_frd, quat_enu_flu_from_ned_frd
+from autopilot.geometry.linear import Vec3
 from autopilot.geometry.so3 import Quat
-from autopilot.wire.codec import FrameWriter, decode
+from autopilot.wire.codec import Fields, FrameWriter, decode, layout_of
 from autopilot.wire.convert.flight import (
-    CascadeErrors,
-    LoadSetpoint,
     LoadState,
-    RotorState,
-    WindState,
-    cascade_errors_message,
-    load_setpoint_message,
-    load_state_message,
-    read_cascade_errors,
-    read_load_setpoint,
+    cascade_errors_values,
+    load_setpoint_values,
+    load_state_values,
     read_load_state,
-    read_rotor_state,
-    read_wind_state,
-    rotor_state_message,
+    rotor_state_values,
     wind_state_message,
 )
 from autopilot.wire.convert.geodesy import (
@@ -43,55 +37,59 @@ from autopilot.wire.convert.geodesy import (
 from autopilot.wire.convert.scaling import int16
 from autopilot.wire.convert.simulator import (
     NO_FORCES,
+    Forces,
     HilActuatorControls,
     HilGps,
     HilSensor,
     HilStateQuaternion,
     LoadSensor,
     Odometry,
-    hil_actuator_controls_message,
-    hil_gps_message,
-    hil_sensor_message,
-    hil_state_quaternion_message,
-    load_sensor_message,
-    odometry_message,
+    load_sensor_record,
+    odometry_record,
     padded_forces,
     read_hil_actuator_controls,
     read_hil_gps,
     read_hil_sensor,
     read_hil_state_quaternion,
-    read_load_sensor,
-    read_odometry,
 )
 from autopilot.wire.convert.telemetry import (
-    altitude_message,
-    attitude_message,
-    attitude_quaternion_message,
-    attitude_target_message,
+    altitude_values,
+    attitude_quaternion_values,
+    attitude_target_values,
+    attitude_values,
     euler_ned_frd,
     global_position_int_message,
     gps_global_origin_message,
     gps_raw_int_message,
     heading_cdeg,
     home_position_message,
-    local_position_ned_message,
-    position_target_local_ned_message,
-    read_attitude_quaternion,
-    read_local_position_ned,
-    vfr_hud_message,
+    local_position_ned_values,
+    position_target_local_ned_values,
+    vfr_hud_values,
     winch_status_message,
+)
+from autopilot.wire.dialect import plumbline as mavlink
+from tests.doubles.messages import (
+    hil_actuator_controls_message,
+    hil_gps_message,
+    hil_sensor_message,
+    hil_state_quaternion_message,
+    load_sensor_message,
+    odometry_message,
 )
 
 FLOAT32 = 2.0**-23  # relative spacing of float32
 DEG_E7_M = EARTH_RADIUS_M * math.pi / 180.0 * 1e-7  # m northwards of one unit of latitude
 HOME = Home()
 NAN = math.nan
+NO_VECTOR = (NAN, NAN, NAN)  # it was not measured
 NED_ENU = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
 FRD_FLU = np.diag([1.0, -1.0, -1.0])
 
 quick = settings(max_examples=60, deadline=None, derandomize=True)
 numbers = st.floats(-1e4, 1e4)
 vectors = st.tuples(numbers, numbers, numbers)
+unmeasured = st.just(NO_VECTOR)
 positive = st.floats(0.0, 1e4)
 times = st.integers(0, 2**63)
 small = st.floats(-300.0, 300.0)
@@ -110,6 +108,124 @@ quats = st.integers(0, 10**6).map(_quat)
 def same_side(q: Quat, other: Quat) -> Quat:
     """q or -q: the same rotation, whichever is nearer to the other."""
     return (-q[0], -q[1], -q[2], -q[3]) if np.dot(q, other) < 0.0 else q
+
+
+def written(values: Callable[..., Any], message_type: Any) -> Callable[..., Fields]:
+    """The fields of a message whose numbers are what `values` returns, as machine code writes them."""
+    return lambda *arguments: (layout_of(message_type), values(*arguments))
+
+
+attitude = written(attitude_values, mavlink.MAVLink_attitude_message)
+attitude_quaternion = written(attitude_quaternion_values, mavlink.MAVLink_attitude_quaternion_message)
+attitude_target = written(attitude_target_values, mavlink.MAVLink_attitude_target_message)
+local_position_ned = written(local_position_ned_values, mavlink.MAVLink_local_position_ned_message)
+position_target_local_ned = written(
+    position_target_local_ned_values, mavlink.MAVLink_position_target_local_ned_message
+)
+altitude_above_home = written(altitude_values, mavlink.MAVLink_altitude_message)
+vfr_hud = written(vfr_hud_values, mavlink.MAVLink_vfr_hud_message)
+load_state = written(load_state_values, mavlink.MAVLink_load_state_message)
+load_setpoint = written(load_setpoint_values, mavlink.MAVLink_load_setpoint_message)
+cascade_errors = written(cascade_errors_values, mavlink.MAVLink_cascade_errors_message)
+rotor_state = written(rotor_state_values, mavlink.MAVLink_rotor_state_message)
+
+
+class LoadSetpoint(NamedTuple):
+    """The arguments of `load_setpoint_values`."""
+
+    time_us: int
+    phase: int
+    control_mode: int
+    seq: int
+    position: Vec3
+    velocity: Vec3
+    acceleration: Vec3
+    q_cable_c: Vec3
+    elapsed: float
+    duration: float
+    requested_position: Vec3
+    requested_velocity: Vec3
+
+
+class CascadeErrors(NamedTuple):
+    """The arguments of `cascade_errors_values`."""
+
+    time_us: int
+    control_mode: int
+    e_x: Vec3
+    e_v: Vec3
+    e_q: Vec3
+    e_q_dot: Vec3
+    e_R: Vec3
+    e_Omega: Vec3
+    psi_R: float
+    psi_q: float
+    thrust: float
+    moment: Vec3
+
+
+class WindState(NamedTuple):
+    """The arguments of `wind_state_message`."""
+
+    time_us: int
+    wind: Vec3
+    gust: Vec3
+
+
+class RotorState(NamedTuple):
+    """The arguments of `rotor_state_values`."""
+
+    time_us: int
+    source: int
+    forces: Forces
+    force_min: float
+    force_max: float
+    saturated: int
+    rotors: int = 4
+
+
+def read_load_setpoint(m: Any) -> LoadSetpoint:
+    return LoadSetpoint(
+        m.time_usec,
+        m.phase,
+        m.control_mode,
+        m.seq,
+        enu_from_ned((m.x, m.y, m.z)),
+        enu_from_ned((m.vx, m.vy, m.vz)),
+        enu_from_ned((m.ax, m.ay, m.az)),
+        enu_from_ned((m.qx, m.qy, m.qz)),
+        m.elapsed,
+        m.duration,
+        enu_from_ned((m.asked_x, m.asked_y, m.asked_z)),
+        enu_from_ned((m.asked_vx, m.asked_vy, m.asked_vz)),
+    )
+
+
+def read_cascade_errors(m: Any) -> CascadeErrors:
+    return CascadeErrors(
+        m.time_usec,
+        m.control_mode,
+        enu_from_ned(tuple(m.e_x)),
+        enu_from_ned(tuple(m.e_v)),
+        enu_from_ned(tuple(m.e_q)),
+        enu_from_ned(tuple(m.e_q_dot)),
+        flu_from_frd(tuple(m.e_r)),
+        flu_from_frd(tuple(m.e_omega)),
+        m.psi_r,
+        m.psi_q,
+        m.thrust,
+        flu_from_frd(tuple(m.moment)),
+    )
+
+
+def read_wind_state(m: Any) -> WindState:
+    return WindState(m.time_usec, enu_from_ned(tuple(m.wind)), enu_from_ned(tuple(m.gust)))
+
+
+def read_rotor_state(m: Any) -> RotorState:
+    forces = padded_forces((*m.force, *m.more_force))
+    saturated = m.saturated | m.more_saturated << 8
+    return RotorState(m.time_usec, m.source, forces, m.force_min, m.force_max, saturated, m.rotors or 4)
 
 
 def over_the_wire(message: Any) -> Any:
@@ -167,16 +283,16 @@ RECORDS: dict[str, tuple[st.SearchStrategy[Any], Callable[..., Any], Callable[[A
         st.builds(
             LoadSensor,
             times,
-            st.none() | vectors,
-            st.none() | vectors,
-            st.none() | vectors,
+            unmeasured | vectors,
+            unmeasured | vectors,
+            unmeasured | vectors,
             positive,
             positive,
             positive,
             st.integers(0, 2),
         ),
         load_sensor_message,
-        read_load_sensor,
+        load_sensor_record,
     ),
     "hil_actuator_controls": (
         st.builds(
@@ -205,7 +321,7 @@ RECORDS: dict[str, tuple[st.SearchStrategy[Any], Callable[..., Any], Callable[[A
             st.booleans(),
             st.integers(0, 65535),
         ),
-        load_state_message,
+        load_state,
         read_load_state,
     ),
     "load_setpoint": (
@@ -224,7 +340,7 @@ RECORDS: dict[str, tuple[st.SearchStrategy[Any], Callable[..., Any], Callable[[A
             vectors,
             vectors,
         ),
-        load_setpoint_message,
+        load_setpoint,
         read_load_setpoint,
     ),
     "cascade_errors": (
@@ -238,7 +354,7 @@ RECORDS: dict[str, tuple[st.SearchStrategy[Any], Callable[..., Any], Callable[[A
             numbers,
             vectors,
         ),
-        cascade_errors_message,
+        cascade_errors,
         read_cascade_errors,
     ),
     "rotor_state": (
@@ -252,7 +368,7 @@ RECORDS: dict[str, tuple[st.SearchStrategy[Any], Callable[..., Any], Callable[[A
             st.integers(0, 2**14 - 1),
             st.integers(4, 14),
         ),
-        rotor_state_message,
+        rotor_state,
         read_rotor_state,
     ),
     "wind state": (
@@ -274,23 +390,23 @@ def test_a_record_comes_back(name: str, data: st.DataObject) -> None:
 
 @given(
     st.tuples(
-        *(times, vectors, quats, st.none() | vectors, st.none() | vectors),
+        *(times, vectors, quats, unmeasured | vectors, unmeasured | vectors),
         *(positive, positive, positive, st.integers(0, 255)),
     )
 )
 @quick
 def test_odometry_comes_back(fields: Any) -> None:
     sent = Odometry(*fields)
-    if sent.velocity is None:
+    if math.isnan(sent.velocity[0]):
         sent = sent._replace(velocity_std=NAN)
     # a quaternion that is half a turn away may come back with the other sign
-    got = read_odometry(over_the_wire(odometry_message(*fields)))
+    got = odometry_record(over_the_wire(odometry_message(*fields)))
     got = got._replace(quat_wxyz=same_side(got.quat_wxyz, sent.quat_wxyz))
     assert_close(got, sent)
 
 
 def test_the_covariance_of_odometry_is_diagonal_and_in_its_place() -> None:
-    message = odometry_message(1, (1.0, 2.0, 3.0), (1.0, 0.0, 0.0, 0.0), None, None, 0.1, 0.2, 0.3)
+    message = odometry_message(1, (1.0, 2.0, 3.0), (1.0, 0.0, 0.0, 0.0), NO_VECTOR, NO_VECTOR, 0.1, 0.2, 0.3)
     triangle = np.zeros((6, 6))
     triangle[np.triu_indices(6)] = message.pose_covariance
     assert np.array_equal(triangle, np.diag(triangle.diagonal()))
@@ -362,15 +478,15 @@ def test_a_vehicle_that_pitches_down_and_flies_east() -> None:
     # nose east, 10 degrees nose down: FLU pitch is positive nose down
     half = math.radians(10.0) / 2.0
     quat = (math.cos(half), 0.0, math.sin(half), 0.0)
-    attitude = named(attitude_message(5_000, quat, (0.1, 0.2, 0.3)))
-    assert (attitude.roll, attitude.pitch, attitude.yaw) == pytest.approx(
+    told = named(attitude(5_000, quat, (0.1, 0.2, 0.3)))
+    assert (told.roll, told.pitch, told.yaw) == pytest.approx(
         (0.0, math.radians(-10.0), math.radians(90.0)), abs=1e-15
     )
-    assert (attitude.rollspeed, attitude.pitchspeed, attitude.yawspeed) == (0.1, -0.2, -0.3)
-    assert attitude.time_boot_ms == 5
-    local = named(local_position_ned_message(0, (1.0, 2.0, 3.0), (4.0, 5.0, 6.0)))
+    assert (told.rollspeed, told.pitchspeed, told.yawspeed) == (0.1, -0.2, -0.3)
+    assert told.time_boot_ms == 5
+    local = named(local_position_ned(0, (1.0, 2.0, 3.0), (4.0, 5.0, 6.0)))
     assert (local.x, local.y, local.z, local.vx, local.vy, local.vz) == (2.0, 1.0, -3.0, 5.0, 4.0, -6.0)
-    hud = named(vfr_hud_message((3.0, 0.0, 4.0), quat, 7.0, 0.55, Home(0.0, 0.0, 100.0)))
+    hud = named(vfr_hud((3.0, 0.0, 4.0), quat, 7.0, 0.55, Home(0.0, 0.0, 100.0)))
     assert (hud.groundspeed, hud.airspeed, hud.climb, hud.alt, hud.heading, hud.throttle) == (
         3.0, 5.0, 4.0, 107.0, 90, 55,
     )  # fmt: skip
@@ -381,13 +497,15 @@ def test_a_vehicle_that_pitches_down_and_flies_east() -> None:
 @given(quats, vectors, st.integers(0, 2**40))
 @quick
 def test_telemetry_comes_back(quat: Any, vector: Any, now_us: int) -> None:
-    attitude = attitude_quaternion_message(now_us, quat, vector)
-    got = read_attitude_quaternion(over_the_wire(attitude))
-    assert abs(np.dot(got.quat_wxyz, quat)) == pytest.approx(1.0, abs=FLOAT32)
-    assert got.omega_body == pytest.approx(vector, rel=FLOAT32)
-    assert got.boot_ms == now_us // 1000 % 2**32
-    local = read_local_position_ned(over_the_wire(local_position_ned_message(now_us, vector, vector)))
-    assert local.position == local.velocity == pytest.approx(vector, rel=FLOAT32)
+    told = over_the_wire(attitude_quaternion(now_us, quat, vector))
+    got = quat_enu_flu_from_ned_frd((told.q1, told.q2, told.q3, told.q4))
+    assert abs(np.dot(got, quat)) == pytest.approx(1.0, abs=FLOAT32)
+    rates = (told.rollspeed, told.pitchspeed, told.yawspeed)
+    assert flu_from_frd(rates) == pytest.approx(vector, rel=FLOAT32)
+    assert told.time_boot_ms == now_us // 1000 % 2**32
+    local = over_the_wire(local_position_ned(now_us, vector, vector))
+    position, velocity = (local.x, local.y, local.z), (local.vx, local.vy, local.vz)
+    assert enu_from_ned(position) == enu_from_ned(velocity) == pytest.approx(vector, rel=FLOAT32)
 
 
 WILD = (1e30, -1e30, math.inf)
@@ -405,28 +523,28 @@ def test_no_state_however_wild_raises(v: Any, quat: Any) -> None:
         hil_gps_message(0, 3, v, v, v[0], v[0], 10, home=HOME),
         hil_state_quaternion_message(0, quat, v, v, v, v[0], v, home=HOME),
         hil_actuator_controls_message(0, (v[0],) * 14, True, True),
-        load_state_message(0, 0, v, v, v, v, v[0], v[0], True, 10**9),
-        load_setpoint_message(0, 0, 0, 10**9, v, v, v, v, v[0], v[0], v, v),
-        cascade_errors_message(0, 0, v, v, v, v, v, v, v[0], v[0], v[0], v),
-        rotor_state_message(0, 0, (v[0],) * 14, v[0], v[0], 0),
+        load_state(0, 0, v, v, v, v, v[0], v[0], True, 10**9),
+        load_setpoint(0, 0, 0, 10**9, v, v, v, v, v[0], v[0], v, v),
+        cascade_errors(0, 0, v, v, v, v, v, v, v[0], v[0], v[0], v),
+        rotor_state(0, 0, (v[0],) * 14, v[0], v[0], 0),
         wind_state_message(0, v, v),
-        attitude_message(0, quat, v),
-        attitude_quaternion_message(0, quat, v),
-        local_position_ned_message(0, v, v),
+        attitude(0, quat, v),
+        attitude_quaternion(0, quat, v),
+        local_position_ned(0, v, v),
         global_position_int_message(0, v, v, quat, HOME),
         gps_raw_int_message(0, 3, v, v, v[0], v[0], 10, HOME),
-        altitude_message(0, v[0], HOME),
-        vfr_hud_message(v, quat, v[0], v[0], HOME),
+        altitude_above_home(0, v[0], HOME),
+        vfr_hud(v, quat, v[0], v[0], HOME),
         home_position_message(0, v, HOME),
         gps_global_origin_message(0, HOME),
-        position_target_local_ned_message(0, v, v, v),
-        attitude_target_message(0, quat, v, v[0]),
+        position_target_local_ned(0, v, v, v),
+        attitude_target(0, quat, v, v[0]),
         winch_status_message(0, v[0], v[0]),
     ]
     for message in messages:
         over_the_wire(message)
     assert read_hil_gps(over_the_wire(messages[3]), HOME).satellites == 10
-    read_odometry(over_the_wire(messages[1]))
+    odometry_record(over_the_wire(messages[1]))
 
 
 @pytest.mark.parametrize(
@@ -521,7 +639,7 @@ ON_THE_WIRE: list[tuple[Any, dict[str, list[Any]]]] = [
         {"rollspeed pitchspeed yawspeed": FRD, "vx vy vz": CENTI_NED, "xacc yacc zacc": [0, 0, -1000]},
     ),
     (
-        load_state_message(0, 1, V, V, V, V, 4.0, 5.0, True, 6),
+        load_state(0, 1, V, V, V, V, 4.0, 5.0, True, 6),
         {
             "x y z": NED,
             "vx vy vz": NED,
@@ -531,7 +649,7 @@ ON_THE_WIRE: list[tuple[Any, dict[str, list[Any]]]] = [
         },
     ),
     (
-        load_setpoint_message(0, 5, 3, 7, V, V, V, V, 1.0, 2.0, V, V),
+        load_setpoint(0, 5, 3, 7, V, V, V, V, 1.0, 2.0, V, V),
         {
             "x y z": NED,
             "vx vy vz": NED,
@@ -543,7 +661,7 @@ ON_THE_WIRE: list[tuple[Any, dict[str, list[Any]]]] = [
         },
     ),
     (
-        cascade_errors_message(0, 3, V, V, V, V, V, V, 0.1, 0.2, 4.0, V),
+        cascade_errors(0, 3, V, V, V, V, V, V, 0.1, 0.2, 4.0, V),
         {
             **{name: [tuple(NED)] for name in ("e_x", "e_v", "e_q", "e_q_dot")},
             **{name: [tuple(FRD)] for name in ("e_r", "e_omega", "moment")},
@@ -551,16 +669,16 @@ ON_THE_WIRE: list[tuple[Any, dict[str, list[Any]]]] = [
         },
     ),
     (
-        rotor_state_message(0, 2, padded_forces((1.0, 2.0, 3.0, 4.0)), 0.0, math.inf, 9),
+        rotor_state(0, 2, padded_forces((1.0, 2.0, 3.0, 4.0)), 0.0, math.inf, 9),
         {"force": [(1.0, 2.0, 3.0, 4.0)], "force_min force_max saturated source": [0.0, math.inf, 9, 2]},
     ),
     (wind_state_message(0, V, V), {"wind": [tuple(NED)], "gust": [tuple(NED)]}),
     (
-        position_target_local_ned_message(0, V, V, V),
+        position_target_local_ned(0, V, V, V),
         {"x y z": NED, "vx vy vz": NED, "afx afy afz": NED, "type_mask": [0xC00]},
     ),
     (
-        attitude_target_message(0, UPRIGHT, V, 0.5),
+        attitude_target(0, UPRIGHT, V, 0.5),
         {"body_roll_rate body_pitch_rate body_yaw_rate thrust": [*FRD, 0.5]},
     ),
 ]

@@ -2,15 +2,13 @@
 
 Both ends are machine code: `x_values` returns the numbers of a message in the order of the wire, arrays
 spread out, which `autopilot.wire.compiled` writes; `x_record`, or `read_x` where nothing can be missing,
-reads the records of that module as well as pymavlink's objects. In `x_values` and `x_record` a vector that
-was not measured is NaN.
+reads the records of that module as well as pymavlink's objects. A vector that was not measured is NaN.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from itertools import islice
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -54,14 +52,6 @@ _GRIPPER, _WINCH = 4, 5  # of HIL_ACTUATOR_CONTROLS: between the first four roto
 REEL_MAX = 2.0  # m/s, rate of a winch whose control is 1
 
 
-def _message(message_type: Any, values: tuple[float, ...]) -> Any:
-    """pymavlink's object of these numbers, given in the order of the wire."""
-    numbers = iter(values)
-    lengths: list[int] = message_type.array_lengths
-    fields = [list(islice(numbers, length)) if length else next(numbers) for length in lengths]
-    return message_type(*(fields[place] for place in message_type.orders))
-
-
 def padded_forces(forces: Sequence[float]) -> Forces:
     """The forces of a vehicle, with zeros for the rotors that it does not have."""
     f = (*forces, *NO_FORCES[len(forces) :])
@@ -87,16 +77,6 @@ def forces_from_row(row: Row, at: int) -> Forces:
         row[at + 12],
         row[at + 13],
     )
-
-
-def _or_nan(v: Vec3 | None) -> Vec3:
-    """A vector as it is sent: NaN if it was not measured."""
-    return _NAN3 if v is None else v
-
-
-def _or_none(v: Vec3 | None) -> Vec3 | None:
-    """A received vector: None if it was not measured."""
-    return None if v is None or math.isnan(v[0]) else v
 
 
 class HilSensor(NamedTuple):
@@ -140,14 +120,9 @@ def hil_sensor_values(
     )
 
 
-def hil_sensor_message(*record: Any) -> Any:
-    """HIL_SENSOR, see `HilSensor`."""
-    return _message(mavlink.MAVLink_hil_sensor_message, hil_sensor_values(*record))
-
-
 @register_jitable
 def read_hil_sensor(m: Any) -> HilSensor:
-    """Inverse of `hil_sensor_message`."""
+    """Inverse of `hil_sensor_values`."""
     return HilSensor(
         m.time_usec,
         flu_from_frd((m.xacc, m.yacc, m.zacc)),
@@ -167,8 +142,8 @@ class Odometry(NamedTuple):
     time_us: int
     position: Vec3
     quat_wxyz: Quat
-    velocity: Vec3 | None  # world
-    omega_body: Vec3 | None
+    velocity: Vec3  # world
+    omega_body: Vec3
     position_std: float  # m
     attitude_std: float  # rad
     velocity_std: float  # m/s
@@ -212,19 +187,6 @@ def odometry_values(
     )
 
 
-def odometry_message(
-    time_us: int,
-    position: Vec3,
-    quat_wxyz: Quat,
-    velocity: Vec3 | None,
-    omega_body: Vec3 | None,
-    *rest: Any,
-) -> Any:
-    """ODOMETRY, see `Odometry`."""
-    values = odometry_values(time_us, position, quat_wxyz, _or_nan(velocity), _or_nan(omega_body), *rest)
-    return _message(mavlink.MAVLink_odometry_message, values)
-
-
 @register_jitable
 def odometry_record(m: Any) -> Any:
     """The record of an ODOMETRY; vectors that were not measured are NaN."""
@@ -242,12 +204,6 @@ def odometry_record(m: Any) -> Any:
     )
 
 
-def read_odometry(m: Any) -> Odometry:
-    """Inverse of `odometry_message`."""
-    read: Odometry = odometry_record(m)
-    return read._replace(velocity=_or_none(read.velocity), omega_body=_or_none(read.omega_body))
-
-
 @register_jitable
 def _root(variance: float) -> float:
     return math.sqrt(variance) if variance >= 0.0 else math.nan
@@ -257,9 +213,9 @@ class LoadSensor(NamedTuple):
     """LOAD_SENSOR: a reading of a load tracker (0), a camera (1) or a cable-angle sensor (2)."""
 
     time_us: int
-    position: Vec3 | None
-    velocity: Vec3 | None
-    direction_body: Vec3 | None  # unit vector from vehicle to load
+    position: Vec3
+    velocity: Vec3
+    direction_body: Vec3  # unit vector from vehicle to load
     position_std: float  # m
     velocity_std: float  # m/s
     direction_std: float  # rad
@@ -298,14 +254,6 @@ def load_sensor_values(
     )
 
 
-def load_sensor_message(
-    time_us: int, position: Vec3 | None, velocity: Vec3 | None, direction_body: Vec3 | None, *rest: Any
-) -> Any:
-    """LOAD_SENSOR, see `LoadSensor`."""
-    vectors = (_or_nan(position), _or_nan(velocity), _or_nan(direction_body))
-    return _message(mavlink.MAVLink_load_sensor_message, load_sensor_values(time_us, *vectors, *rest))
-
-
 @register_jitable
 def load_sensor_record(m: Any) -> Any:
     """The record of a LOAD_SENSOR; vectors that were not measured are NaN."""
@@ -318,16 +266,6 @@ def load_sensor_record(m: Any) -> Any:
         m.velocity_std,
         m.direction_std,
         m.sensor_id,
-    )
-
-
-def read_load_sensor(m: Any) -> LoadSensor:
-    """Inverse of `load_sensor_message`."""
-    read: LoadSensor = load_sensor_record(m)
-    return read._replace(
-        position=_or_none(read.position),
-        velocity=_or_none(read.velocity),
-        direction_body=_or_none(read.direction_body),
     )
 
 
@@ -376,14 +314,9 @@ def hil_gps_values(
     )
 
 
-def hil_gps_message(*record: Any, home: Home) -> Any:
-    """HIL_GPS, see `HilGps`."""
-    return _message(mavlink.MAVLink_hil_gps_message, hil_gps_values(*(*record, home)))
-
-
 @register_jitable
 def read_hil_gps(m: Any, home: Home) -> HilGps:
-    """Inverse of `hil_gps_message`."""
+    """Inverse of `hil_gps_values`."""
     return HilGps(
         m.time_usec,
         m.fix_type,
@@ -442,14 +375,8 @@ def hil_state_quaternion_values(
     )
 
 
-def hil_state_quaternion_message(*record: Any, home: Home) -> Any:
-    """HIL_STATE_QUATERNION, see `HilStateQuaternion`."""
-    values = hil_state_quaternion_values(*(*record, home))
-    return _message(mavlink.MAVLink_hil_state_quaternion_message, values)
-
-
 def read_hil_state_quaternion(m: Any, home: Home) -> HilStateQuaternion:
-    """Inverse of `hil_state_quaternion_message`."""
+    """Inverse of `hil_state_quaternion_values`."""
     q = m.attitude_quaternion
     g = STANDARD_GRAVITY * 1e-3
     return HilStateQuaternion(
@@ -513,14 +440,9 @@ def hil_actuator_controls_values(
     )
 
 
-def hil_actuator_controls_message(*record: Any) -> Any:
-    """HIL_ACTUATOR_CONTROLS, see `HilActuatorControls`."""
-    return _message(mavlink.MAVLink_hil_actuator_controls_message, hil_actuator_controls_values(*record))
-
-
 @register_jitable
 def read_hil_actuator_controls(m: Any) -> HilActuatorControls:
-    """Inverse of `hil_actuator_controls_message`."""
+    """Inverse of `hil_actuator_controls_values`."""
     controls = m.controls
     return HilActuatorControls(
         m.time_usec,

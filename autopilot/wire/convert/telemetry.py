@@ -1,22 +1,16 @@
 """Common telemetry of a vehicle, built from ENU and FLU; any ground station reads it.
 
-Builders return the fields as they are sent. `now_us` is the time since boot. There are inverses for the
-messages that our own ground station reads: attitude and local position.
+`x_message` returns the fields as they are sent, `x_values` only their numbers, for the messages that machine
+code writes. `now_us` is the time since boot.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
 
 from numba.extending import register_jitable
 
-from autopilot.geometry.frames import (
-    enu_from_ned,
-    flu_from_frd,
-    quat_enu_flu_from_ned_frd,
-    quat_ned_frd_from_enu_flu,
-)
+from autopilot.geometry.frames import quat_ned_frd_from_enu_flu
 from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.geometry.so3 import Quat
 from autopilot.wire.codec import Fields, layout_of
@@ -32,17 +26,10 @@ _UINT32 = 0xFFFFFFFF
 # GPS_RAW_INT: the dilutions HDOP and VDOP, which PX4's simulated receiver states: no satellites are modelled
 _DILUTIONS, _NO_DILUTIONS = (70, 110), (0xFFFF, 0xFFFF)
 _NO_ACCURACIES = (0, 0, 0)  # GPS_RAW_INT: of speed and heading, and the heading itself
-_ATTITUDE = layout_of(mavlink.MAVLink_attitude_message)
-_ATTITUDE_QUATERNION = layout_of(mavlink.MAVLink_attitude_quaternion_message)
-_LOCAL_POSITION_NED = layout_of(mavlink.MAVLink_local_position_ned_message)
 _GLOBAL_POSITION_INT = layout_of(mavlink.MAVLink_global_position_int_message)
 _GPS_RAW_INT = layout_of(mavlink.MAVLink_gps_raw_int_message)
-_ALTITUDE = layout_of(mavlink.MAVLink_altitude_message)
-_VFR_HUD = layout_of(mavlink.MAVLink_vfr_hud_message)
 _HOME_POSITION = layout_of(mavlink.MAVLink_home_position_message)
 _GPS_GLOBAL_ORIGIN = layout_of(mavlink.MAVLink_gps_global_origin_message)
-_POSITION_TARGET_LOCAL_NED = layout_of(mavlink.MAVLink_position_target_local_ned_message)
-_ATTITUDE_TARGET = layout_of(mavlink.MAVLink_attitude_target_message)
 _WINCH_STATUS = layout_of(mavlink.MAVLink_winch_status_message)
 _POSITION_VELOCITY_ACCELERATION = 0xC00  # POSITION_TARGET_TYPEMASK: yaw and yaw rate are not given
 
@@ -82,19 +69,6 @@ def attitude_values(now_us: int, quat_wxyz: Quat, omega_body: Vec3) -> tuple[flo
     return (boot_ms(now_us), *euler_ned_frd(quat_wxyz), *frd_from_flu(omega_body))
 
 
-def attitude_message(now_us: int, quat_wxyz: Quat, omega_body: Vec3) -> Fields:
-    """ATTITUDE."""
-    return _ATTITUDE, attitude_values(now_us, quat_wxyz, omega_body)
-
-
-class AttitudeQuaternion(NamedTuple):
-    """ATTITUDE_QUATERNION."""
-
-    boot_ms: int
-    quat_wxyz: Quat
-    omega_body: Vec3
-
-
 @register_jitable
 def attitude_quaternion_values(now_us: int, quat_wxyz: Quat, omega_body: Vec3) -> tuple[float, ...]:
     """ATTITUDE_QUATERNION: the numbers in the order of the wire."""
@@ -106,42 +80,10 @@ def attitude_quaternion_values(now_us: int, quat_wxyz: Quat, omega_body: Vec3) -
     )
 
 
-def attitude_quaternion_message(now_us: int, quat_wxyz: Quat, omega_body: Vec3) -> Fields:
-    """ATTITUDE_QUATERNION."""
-    return _ATTITUDE_QUATERNION, attitude_quaternion_values(now_us, quat_wxyz, omega_body)
-
-
-def read_attitude_quaternion(m: Any) -> AttitudeQuaternion:
-    """Inverse of `attitude_quaternion_message`."""
-    return AttitudeQuaternion(
-        m.time_boot_ms,
-        quat_enu_flu_from_ned_frd((m.q1, m.q2, m.q3, m.q4)),
-        flu_from_frd((m.rollspeed, m.pitchspeed, m.yawspeed)),
-    )
-
-
-class LocalPosition(NamedTuple):
-    """LOCAL_POSITION_NED."""
-
-    boot_ms: int
-    position: Vec3
-    velocity: Vec3
-
-
 @register_jitable
 def local_position_ned_values(now_us: int, position: Vec3, velocity: Vec3) -> tuple[float, ...]:
     """LOCAL_POSITION_NED: the numbers in the order of the wire."""
     return (boot_ms(now_us), *ned_from_enu(position), *ned_from_enu(velocity))
-
-
-def local_position_ned_message(now_us: int, position: Vec3, velocity: Vec3) -> Fields:
-    """LOCAL_POSITION_NED."""
-    return _LOCAL_POSITION_NED, local_position_ned_values(now_us, position, velocity)
-
-
-def read_local_position_ned(m: Any) -> LocalPosition:
-    """Inverse of `local_position_ned_message`."""
-    return LocalPosition(m.time_boot_ms, enu_from_ned((m.x, m.y, m.z)), enu_from_ned((m.vx, m.vy, m.vz)))
 
 
 @register_jitable
@@ -217,11 +159,6 @@ def altitude_values(now_us: int, height: float, home: Home) -> tuple[float, ...]
     return (now_us, height, above_sea, height, height, home.altitude_m, height)
 
 
-def altitude_message(now_us: int, height: float, home: Home) -> Fields:
-    """ALTITUDE for a height in m above home."""
-    return _ALTITUDE, altitude_values(now_us, height, home)
-
-
 @register_jitable
 def vfr_hud_values(
     velocity: Vec3, quat_wxyz: Quat, height: float, throttle: float, home: Home
@@ -242,11 +179,6 @@ def vfr_hud_values(
         0 if heading == _NO_HEADING else heading // 100,
         uint16(share * 100.0),
     )
-
-
-def vfr_hud_message(velocity: Vec3, quat_wxyz: Quat, height: float, throttle: float, home: Home) -> Fields:
-    """VFR_HUD."""
-    return _VFR_HUD, vfr_hud_values(velocity, quat_wxyz, height, throttle, home)
 
 
 def home_position_message(now_us: int, launch: Vec3, home: Home) -> Fields:
@@ -274,7 +206,7 @@ def gps_global_origin_message(now_us: int, home: Home) -> Fields:
 def position_target_local_ned_values(
     now_us: int, position: Vec3, velocity: Vec3, acceleration: Vec3
 ) -> tuple[float, ...]:
-    """POSITION_TARGET_LOCAL_NED: the numbers in the order of the wire."""
+    """POSITION_TARGET_LOCAL_NED, the setpoint in force: the numbers in the order of the wire."""
     return (
         boot_ms(now_us),
         *ned_from_enu(position),
@@ -287,20 +219,11 @@ def position_target_local_ned_values(
     )
 
 
-def position_target_local_ned_message(
-    now_us: int, position: Vec3, velocity: Vec3, acceleration: Vec3
-) -> Fields:
-    """POSITION_TARGET_LOCAL_NED: the setpoint in force."""
-    return _POSITION_TARGET_LOCAL_NED, position_target_local_ned_values(
-        now_us, position, velocity, acceleration
-    )
-
-
 @register_jitable
 def attitude_target_values(
     now_us: int, quat_wxyz: Quat, omega_body: Vec3, thrust_fraction: float
 ) -> tuple[float, ...]:
-    """ATTITUDE_TARGET: the numbers in the order of the wire."""
+    """ATTITUDE_TARGET, the setpoint of the inner loop: the numbers in the order of the wire."""
     return (
         boot_ms(now_us),
         *quat_ned_frd_from_enu_flu(quat_wxyz),
@@ -308,11 +231,6 @@ def attitude_target_values(
         thrust_fraction,
         0,
     )
-
-
-def attitude_target_message(now_us: int, quat_wxyz: Quat, omega_body: Vec3, thrust_fraction: float) -> Fields:
-    """ATTITUDE_TARGET: the setpoint of the inner loop."""
-    return _ATTITUDE_TARGET, attitude_target_values(now_us, quat_wxyz, omega_body, thrust_fraction)
 
 
 def winch_status_message(
