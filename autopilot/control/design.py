@@ -99,7 +99,7 @@ class Timing(NamedTuple):
 
 
 class Design(NamedTuple):
-    """Gains, with the bandwidths and margins they were computed for."""
+    """Gains, with the bandwidths and the tolerance of delay that they were computed for."""
 
     gains: PlumblineGains
     omega_i: float  # rad/s
@@ -107,7 +107,6 @@ class Design(NamedTuple):
     omega_q: float
     omega_R: float
     tolerance: float  # s
-    rotor_deviation: float  # N, standard deviation of a rotor's command
 
 
 def swing_stiffness(vehicle: Vehicle) -> float:
@@ -277,5 +276,5 @@ def design(requirements: Requirements, timing: Timing, vehicle: Vehicle) -> Desi
             high = middle
     max_omega_q = requirements.cable_ratio * MAX_SWING_RATIO * math.sqrt(swing_stiffness(vehicle))
     omegas = bandwidths(min(math.exp(low), requirements.attitude_ratio * max_omega_q))
-    gains = gains_of(*omegas, requirements.zeta, vehicle)
-    return Design(gains, *omegas, *evaluate_at(omegas[-1]))
+    tolerance, _ = evaluate_at(omegas[-1])
+    return Design(gains_of(*omegas, requirements.zeta, vehicle), *omegas, tolerance)

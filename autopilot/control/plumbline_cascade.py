@@ -120,17 +120,6 @@ class CommandedForce(NamedTuple):
     q_c: DirectionCommand
 
 
-PLUMBLINE_GAINS = PlumblineGains(
-    k_R=(0.9, 0.9, 0.9),
-    k_Omega=(0.1, 0.1, 0.1),
-    k_q=3.9,
-    k_omega=2.0,
-    k_x=(6.0, 6.0, 6.0),
-    k_v=(2.75, 2.75, 2.75),
-    k_i=(0.0, 0.0, 0.0),
-)
-
-
 @kernel
 def start() -> PlumblineMemory:
     """Memory of a law that begins now: the thrust is assumed to be steady."""

@@ -9,7 +9,6 @@ that claims to be perfect.
 from __future__ import annotations
 
 from math import isfinite
-from typing import Any
 
 import numpy as np
 
@@ -24,7 +23,7 @@ from autopilot.estimation.records import (
 )
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import ZERO, Vec3, norm, scale
-from autopilot.geometry.packed import pack, unpack
+from autopilot.geometry.packed import unpack
 from autopilot.geometry.so3 import Quat
 
 KIND, SAMPLE_TIME_US, READING = 0, 1, 2  # columns
@@ -53,19 +52,6 @@ REPEATED_SAMPLE = -1  # instant of an inertial sample that only repeats the last
 def new_inbox(rows: int = INBOX_ROWS) -> Array:
     """An inbox with room for this many readings."""
     return np.zeros((rows, COLUMNS))
-
-
-def put_reading(inbox: Array, row: int, kind: int, sample_time_us: int, reading: Any) -> None:
-    """Write a record of a reading into a row; its age is not used."""
-    inbox[row, KIND] = kind
-    inbox[row, SAMPLE_TIME_US] = sample_time_us
-    pack(reading, inbox[row], READING)
-
-
-def put_vector(inbox: Array, row: int, kind: int, vector: tuple[float, ...]) -> None:
-    """Write a reading that is a number or a vector, and of this instant."""
-    inbox[row, KIND] = kind
-    inbox[row, READING : READING + len(vector)] = vector
 
 
 @kernel

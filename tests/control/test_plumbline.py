@@ -62,7 +62,15 @@ ZERO, EAST = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0)
 TICK = 0.004
 CALM_AIR = Drag(0.0, 0.0)
 BEBOP_DRAG = Drag(0.02, 0.012)
-GAINS = plumbline.PLUMBLINE_GAINS._replace(k_i=(1.0, 1.0, 1.0))
+GAINS = plumbline.PlumblineGains(
+    k_R=(0.9, 0.9, 0.9),
+    k_Omega=(0.1, 0.1, 0.1),
+    k_q=3.9,
+    k_omega=2.0,
+    k_x=(6.0, 6.0, 6.0),
+    k_v=(2.75, 2.75, 2.75),
+    k_i=(1.0, 1.0, 1.0),
+)
 H = 5e-4  # s, of the differences
 # five-point differences: H^4/30 times a fifth derivative of up to 1e5; rounding 1e-15 / H^2 times 10 N
 DIFFERENCE = 1e-7

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from autopilot.control.believed import believed_vehicle
 from autopilot.control.records import State
 from autopilot.core.attachment import cable_moment, shift_to_attachment
-from autopilot.estimation.inbox import DIRECTION, FIX, HEIGHT, POSE, READING, new_inbox, put_reading
+from autopilot.estimation.inbox import DIRECTION, FIX, HEIGHT, POSE, READING, new_inbox
 from autopilot.estimation.records import (
     DirectionReading,
     EstimatorState,
@@ -23,6 +23,7 @@ from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.parameters import autopilot_parameters
 from sitl.plant.by_value import advance, initial_state
 from sitl.vehicles.truth import load_truth
+from tests.doubles.readings import put_reading
 
 RHO = (0.02, -0.01, -0.03)
 TURNED = Rotation.from_euler("zyx", (0.7, 0.2, -0.1))

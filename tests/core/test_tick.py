@@ -33,6 +33,7 @@ from missions.model import Delay, Land, Takeoff
 from tests.doubles.craft import Craft, at_phase
 from tests.doubles.estimate_problems import estimate_problems
 from tests.doubles.plain_python import in_plain_python
+from tests.doubles.readings import put_reading
 
 TICK_US = 4000
 BEGIN_US = 10_000_000
@@ -62,9 +63,9 @@ def put_hover(core: FlightCore, now_us: int, tick: int) -> int:
     pose = PoseReading(0.0, over, IDENTITY_QUAT, ZERO, 0.001, 0.001, -1.0)
     load = LoadReading(0.0, (0.5 * sway, 0.0, HOVER_M), ZERO, 0.001, -1.0)
     inbox = core.rows.inbox
-    box.put_reading(inbox, 0, box.IMU, now_us, imu)
-    box.put_reading(inbox, 1, box.POSE, now_us - TICK_US, pose)
-    box.put_reading(inbox, 2, box.LOAD, now_us - TICK_US, load)
+    put_reading(inbox, 0, box.IMU, now_us, imu)
+    put_reading(inbox, 1, box.POSE, now_us - TICK_US, pose)
+    put_reading(inbox, 2, box.LOAD, now_us - TICK_US, load)
     return 3
 
 
@@ -215,7 +216,7 @@ def test_more_readings_than_the_inbox_has_room_for_are_all_heard() -> None:
     assert len(readings) > len(core.rows.inbox)
     larger = box.new_inbox(len(readings))
     for at, reading in enumerate(readings):
-        box.put_reading(larger, at, *reading)
+        put_reading(larger, at, *reading)
     core.use_inbox(larger)
     core.step(len(readings), BEGIN_US, 0, 0.0)
     heard = core.rows.history.consistency[0, 0]

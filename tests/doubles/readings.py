@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from autopilot.control.records import Cable
 from autopilot.estimation import inbox as box
 from autopilot.estimation.filter import estimate as estimate_from_inbox
 from autopilot.estimation.records import (
+    Array,
     DirectionReading,
     EstimatorState,
     EstimatorTuning,
@@ -18,6 +19,7 @@ from autopilot.estimation.records import (
     PoseReading,
 )
 from autopilot.geometry.linear import ZERO, Vec3
+from autopilot.geometry.packed import pack
 
 
 class Readings(NamedTuple):
@@ -32,6 +34,19 @@ class Readings(NamedTuple):
     field_body: Vec3 | None = None  # of the magnetometer
 
 
+def put_reading(inbox: Array, row: int, kind: int, sample_time_us: int, reading: Any) -> None:
+    """Write a record of a reading into a row; its age is not used."""
+    inbox[row, box.KIND] = kind
+    inbox[row, box.SAMPLE_TIME_US] = sample_time_us
+    pack(reading, inbox[row], box.READING)
+
+
+def put_vector(inbox: Array, row: int, kind: int, vector: tuple[float, ...]) -> None:
+    """Write a reading that is a number or a vector, and of this instant."""
+    inbox[row, box.KIND] = kind
+    inbox[row, box.READING : box.READING + len(vector)] = vector
+
+
 def estimate(
     state: EstimatorState,
     history: History,
@@ -44,7 +59,7 @@ def estimate(
     inbox = box.new_inbox(64)
     count = 0
     if readings.imu is not None:
-        box.put_reading(inbox, count, box.IMU, 0, readings.imu)
+        put_reading(inbox, count, box.IMU, 0, readings.imu)
         count += 1
     aged = (
         (box.POSE, readings.poses),
@@ -54,14 +69,14 @@ def estimate(
     )
     for kind, found in aged:
         for reading in found:
-            box.put_reading(inbox, count, kind, 0, reading)
+            put_reading(inbox, count, kind, 0, reading)
             inbox[count, box.SAMPLE_TIME_US] = -1e6 * (reading.age_s + tuning.imu_age)
             count += 1
     if readings.height_m is not None:
-        box.put_vector(inbox, count, box.HEIGHT, (readings.height_m,))
+        put_vector(inbox, count, box.HEIGHT, (readings.height_m,))
         count += 1
     if readings.field_body is not None:
-        box.put_vector(inbox, count, box.FIELD, readings.field_body)
+        put_vector(inbox, count, box.FIELD, readings.field_body)
         count += 1
     cable = Cable(tuning.cable_length)
     return estimate_from_inbox(state, history, inbox, count, 0, tuning, cable, 0.0, dt, thrust, ZERO)

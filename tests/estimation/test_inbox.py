@@ -26,6 +26,7 @@ from autopilot.estimation.records import (
 from autopilot.geometry.linear import ZERO
 from autopilot.geometry.packed import packed
 from tests.doubles.motion import CABLE_LENGTH, GRAVITY, TICK_S, bebop_tuning
+from tests.doubles.readings import put_reading, put_vector
 
 NOW_US = 10_000_000
 NAN, INF = math.nan, math.inf
@@ -44,9 +45,9 @@ def row_of(kind: int, reading: Any, shows_us: float = NOW_US) -> Any:
     """A row of an inbox."""
     rows = box.new_inbox(1)
     if kind in (box.FIELD, box.HEIGHT):
-        box.put_vector(rows, 0, kind, reading)
+        put_vector(rows, 0, kind, reading)
     else:
-        box.put_reading(rows, 0, kind, 0, reading)
+        put_reading(rows, 0, kind, 0, reading)
         rows[0, box.SAMPLE_TIME_US] = shows_us
     return rows[0]
 
