@@ -15,6 +15,7 @@ from autopilot.wire.items import (
     AREA_COMMANDS,
     COMMAND,
     ENDLESS,
+    JUMPS,
     Handling,
     MissionItemError,
     WireItem,
@@ -139,7 +140,7 @@ def mission_of(plan: Plan, home: Home, name: str) -> ForeignMission:
         f"item {number}, {numbered_name(item.command)}: repeats without end until a ground station makes an "
         "item behind it the present one (MISSION_SET_CURRENT); expected times count one pass"
         for number, item in zip(numbers, items, strict=True)
-        if ends and item.command == mavlink.MAV_CMD_DO_JUMP and item.param2 == ENDLESS
+        if ends and item.command in JUMPS and item.param2 == ENDLESS
     ]
     release = next((i for i, one in enumerate(flown) if isinstance(one.step, Release)), None)
     if release is not None and any(first <= release <= last for last, first in endless_loops(flown).items()):

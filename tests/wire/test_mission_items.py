@@ -264,6 +264,11 @@ REFUSALS = [
         "repetitions = -2; must be 0 ... 1000, or -1",
     ),
     ([item(201), item(177, 0.0, -1.0), item(93, 1.0)], 1, "INVALID", "must lead back to something"),
+    ([item(93, 1.0), item(600, 5.0), item(601, 4.0, 1.0)], 2, "INVALID_PARAM1", "no item has the tag 4"),
+    ([item(600, 5.0), item(93, 1.0), item(600, 5.0)], 2, "INVALID_PARAM1", "tag 5 is already that of item 0"),
+    ([item(600, -1.0)], 0, "INVALID_PARAM1", "tag = -1; must be 0 ... 65535"),
+    ([item(600, 5.0), item(93, 1.0), item(601, 5.0, -2.0)], 2, "INVALID_PARAM2", "repetitions = -2"),
+    ([item(93, 1.0), item(114, 5.0)], 1, "UNSUPPORTED", "or change the route"),
     ([item(93, 1.0), item(31998)], 1, "UNSUPPORTED", "command 31998"),
     ([item(93, 1.0), item(60000)], 1, "UNSUPPORTED", "command 60000"),
     ([item(186, 3.0, 3.0)], 0, "INVALID", "nothing before it says"),
@@ -369,7 +374,30 @@ def test_a_step_that_would_be_refused_is_not_sent(step: Step) -> None:
         encode_steps([Takeoff(1.0), step], HOME)
 
 
-KNOWN = [16, 17, 18, 31, 82, 177, 186, 4501, 19, 20, 21, 22, 93, 112, 178, 203, 31010, 31011, 31012, 31013]
+KNOWN = [
+    16,
+    17,
+    18,
+    31,
+    82,
+    177,
+    600,
+    601,
+    186,
+    4501,
+    19,
+    20,
+    21,
+    22,
+    93,
+    112,
+    178,
+    203,
+    31010,
+    31011,
+    31012,
+    31013,
+]
 integers = st.integers(-(2**31), 2**31 - 1)
 floats32 = st.floats(width=32)
 
@@ -460,9 +488,7 @@ def test_after_what_leaves_no_known_place_a_height_alone_is_refused(unknown: Wir
 
 
 def test_commands_for_other_things_are_kept_and_not_flown() -> None:
-    assert (
-        decode_items([item(command) for command in (1000, 203, 196, 198, 206, 189, 31000, 43000)], HOME) == ()
-    )
+    assert decode_items([item(command) for command in (1000, 203, 196, 198, 206, 189, 31005)], HOME) == ()
 
 
 def test_points_in_a_row_are_one_trajectory_and_a_point_at_time_zero_begins_another() -> None:
@@ -552,6 +578,18 @@ def test_jumps_fly_their_items_again() -> None:
     located = located_steps(items, HOME)
     assert [one.step.duration_s for one in located] == [1.0, 2.0] * 3 + [3.0]  # type: ignore[union-attr]
     assert [one.first for one in located] == [0, 1] * 3 + [3]
+
+
+def test_jumps_to_a_tag_lead_to_the_item_that_has_it() -> None:
+    tag = item(600, 7.0)
+    items = [item(93, 1.0), tag, item(93, 2.0), item(601, 7.0, 2.0), item(93, 3.0)]
+    by_number = [*items[:3], item(177, 1.0, 2.0), items[4]]
+    assert read_items(items, HOME) == read_items(by_number, HOME)
+    assert [one.first for one in located_steps(items, HOME)] == [0, 2, 2, 2, 4]
+    ahead = [item(93, 1.0), item(601, 7.0, 1.0), item(93, 2.0), tag, item(93, 3.0)]
+    assert decode_items(ahead, HOME) == (Delay(1.0), Delay(3.0))
+    endless = [item(93, 1.0), tag, item(93, 2.0), item(601, 7.0, -1.0)]
+    assert [one.then for one in located_steps(endless, HOME)] == [None, 1]
 
 
 def test_each_visit_to_an_item_states_what_is_flown_then() -> None:

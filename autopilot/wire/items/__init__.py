@@ -6,12 +6,13 @@ durations and holds of signals), microseconds (periods) and 1e-7 degrees (the pl
 Items that were made here come back unchanged: `encode(decode(items)) == items`.
 
 Positions are positions of the load. Items that turn the nose are not steps: the nose begins to turn with the
-step after them. DO_JUMP is flown by flying its items again; one without end leads back to steps before it.
+step after them. A jump is flown by flying its items again; one without end leads back to steps before it.
 """
 
 from autopilot.wire.items.command import Command, Handling, is_home
 from autopilot.wire.items.decode import (
     ENDLESS,
+    JUMPS,
     decode_items,
     endless_loops,
     located_steps,
@@ -28,6 +29,7 @@ __all__ = [
     "COMMAND",
     "COMMANDS",
     "ENDLESS",
+    "JUMPS",
     "Command",
     "Handling",
     "LocatedStep",

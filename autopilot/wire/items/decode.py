@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 from autopilot.geometry.linear import ZERO, Vec3
@@ -56,6 +56,7 @@ _SUGGESTED = (
     mavlink.MAV_CMD_NAV_LAND,
 )
 ENDLESS = -1  # repetitions of a jump
+JUMPS = (mavlink.MAV_CMD_DO_JUMP, mavlink.MAV_CMD_DO_JUMP_TAG)
 _ROUNDING_S = 1e-9  # of times that are whole milliseconds
 _MIN_LAP_S = 0.5  # that an endless jump must take from one time to the next
 
@@ -83,6 +84,7 @@ def read_items(
     which the mission continues if the loop is left.
     """
     reader = _Reader(home, return_to)
+    tags = _tagged_items(items)
     taken: dict[int, int] = {}  # by the item of a jump: how often it was taken
     laps: dict[tuple[tuple[int, int], ...], int] = {}
     visits: list[Visit] = []
@@ -118,10 +120,9 @@ def read_items(
         visited[here] = len(visits)
         visits.append(Visit(seq, len(reader.steps), here[1]))
         flown_count += 1
-        if item.command == mavlink.MAV_CMD_DO_JUMP:
+        if item.command in JUMPS:
             reader.end_step(seq - 1)
-            end = len(items) - 1
-            target = choice(seq, 1, "item to jump to", item.param1, range(end + 1), f"0 ... {end}")
+            target = _jump_target(seq, items, tags)
             allowed = f"0 ... {MAX_JUMPS}, or -1: without end"
             times = choice(seq, 2, "repetitions", item.param2, range(ENDLESS, MAX_JUMPS + 1), allowed)
             if times == ENDLESS:
@@ -140,6 +141,27 @@ def read_items(
         if flown_count > MAX_FLOWN_ITEMS:
             text = f"with its jumps the mission has more than {MAX_FLOWN_ITEMS} items"
             raise MissionItemError(min(seq, len(items) - 1), text, mavlink.MAV_MISSION_NO_SPACE)
+
+
+def _tagged_items(items: Sequence[WireItem]) -> dict[float, int]:
+    """The items that are tagged, by their tags; MissionItemError if two have the same."""
+    tags: dict[float, int] = {}
+    for seq, item in enumerate(items):
+        if item.command == mavlink.MAV_CMD_JUMP_TAG and tags.setdefault(item.param1, seq) != seq:
+            text = f"tag {item.param1:g} is already that of item {tags[item.param1]}"
+            raise MissionItemError(seq, text, mavlink.MAV_MISSION_INVALID_PARAM1)
+    return tags
+
+
+def _jump_target(seq: int, items: Sequence[WireItem], tags: Mapping[float, int]) -> int:
+    """The item to which a jump leads: of a number, or with a tag."""
+    item, end = items[seq], len(items) - 1
+    if item.command == mavlink.MAV_CMD_DO_JUMP:
+        return choice(seq, 1, "item to jump to", item.param1, range(end + 1), f"0 ... {end}")
+    if item.param1 not in tags:
+        text = f"no item has the tag {item.param1:g}, which JUMP_TAG (600) gives"
+        raise MissionItemError(seq, text, mavlink.MAV_MISSION_INVALID_PARAM1)
+    return tags[item.param1]
 
 
 def endless_loops(steps: Sequence[LocatedStep]) -> dict[int, int]:

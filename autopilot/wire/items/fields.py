@@ -280,7 +280,8 @@ def check(
     decimal = decimal_from_float32(value)
     if low <= decimal <= high:
         return decimal
-    text = f"{name} = {value:.7g} {unit}; must be {low:.7g} ... {high:.7g}{hint}"
+    stated = f"{name} = {value:.7g} {unit}".rstrip()
+    text = f"{stated}; must be {low:.7g} ... {high:.7g}{hint}"
     raise MissionItemError(seq, text, _PARAM_RESULT[param - 1])
 
 

@@ -21,6 +21,7 @@ __all__ = [
     "FASTEST_REEL_M_S",
     "HOME_ITEM_RADIUS_M",
     "LARGEST_PHASE_RAD",
+    "LARGEST_TAG",
     "LONGEST_CABLE_M",
     "LONGEST_S",
     "LOWEST_M",
@@ -43,6 +44,7 @@ __all__ = [
 
 LONGEST_S = 86400.0
 LARGEST_PHASE_RAD = 100.0
+LARGEST_TAG = 65535.0  # of a jump
 MAX_ITEMS = 2000  # of a stored mission
 FARTHEST_M = 100_000.0  # from home, as far as the earth may be assumed flat
 FASTEST_M_S = 100.0

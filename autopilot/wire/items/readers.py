@@ -85,6 +85,12 @@ def change_speed(context: ItemContext) -> Iterator[Step]:
         yield Speed(context["speed_m_s"])
 
 
+def jump_tag(context: ItemContext) -> Iterator[Step]:
+    """A tag, to which jumps lead, is nothing to fly."""
+    context["tag"]
+    yield from ()
+
+
 def gripper(context: ItemContext) -> Iterator[Step]:
     """Releasing the load is a step; grabbing a load that is held, as some planners write it, is not."""
     context["gripper"]

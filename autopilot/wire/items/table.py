@@ -28,6 +28,7 @@ from autopilot.wire.items.limits import (
     FASTEST_M_S,
     FASTEST_REEL_M_S,
     LARGEST_PHASE_RAD,
+    LARGEST_TAG,
     LONGEST_CABLE_M,
     LONGEST_S,
     MAX_FLOWN_ITEMS,
@@ -80,7 +81,45 @@ _AREA_TEXTS = {
     m.MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION: _FENCE_TEXT,
     m.MAV_CMD_NAV_RALLY_POINT: "it belongs in the list of rally points (mission type 2)",
 }
-_NOT_SUPPORTED = "the vehicle cannot do it in a mission, and ignoring it would be unsafe"
+_NOT_SUPPORTED = "the vehicle cannot do it in a mission, and ignoring it would be unsafe or change the route"
+_UNSAFE_TO_IGNORE = (
+    m.MAV_CMD_DO_SET_MODE,
+    m.MAV_CMD_DO_SET_STANDARD_MODE,
+    m.MAV_CMD_DO_SET_HOME,
+    m.MAV_CMD_DO_SET_PARAMETER,
+    m.MAV_CMD_DO_FLIGHTTERMINATION,
+    m.MAV_CMD_DO_PARACHUTE,
+    m.MAV_CMD_DO_REPOSITION,
+    m.MAV_CMD_DO_ORBIT,
+    m.MAV_CMD_DO_PAUSE_CONTINUE,
+    m.MAV_CMD_OVERRIDE_GOTO,
+    m.MAV_CMD_DO_SET_MISSION_CURRENT,
+    m.MAV_CMD_MISSION_START,
+    m.MAV_CMD_CONDITION_CHANGE_ALT,
+    m.MAV_CMD_CONDITION_DISTANCE,
+    m.MAV_CMD_DO_RALLY_LAND,
+    m.MAV_CMD_DO_GO_AROUND,
+    m.MAV_CMD_DO_SET_REVERSE,
+    m.MAV_CMD_DO_INVERTED_FLIGHT,
+    m.MAV_CMD_NAV_SET_YAW_SPEED,
+    m.MAV_CMD_DO_GUIDED_MASTER,
+    m.MAV_CMD_DO_GUIDED_LIMITS,
+    m.MAV_CMD_DO_ENGINE_CONTROL,
+    m.MAV_CMD_DO_SET_SAFETY_SWITCH_STATE,
+    m.MAV_CMD_COMPONENT_ARM_DISARM,
+    m.MAV_CMD_SET_GUIDED_SUBMODE_STANDARD,
+    m.MAV_CMD_SET_GUIDED_SUBMODE_CIRCLE,
+    m.MAV_CMD_GUIDED_CHANGE_SPEED,
+    m.MAV_CMD_GUIDED_CHANGE_ALTITUDE,
+    m.MAV_CMD_GUIDED_CHANGE_HEADING,
+    m.MAV_CMD_PAYLOAD_PREPARE_DEPLOY,
+    m.MAV_CMD_PAYLOAD_CONTROL_DEPLOY,
+    m.MAV_CMD_WAYPOINT_USER_1,
+    m.MAV_CMD_WAYPOINT_USER_2,
+    m.MAV_CMD_WAYPOINT_USER_3,
+    m.MAV_CMD_WAYPOINT_USER_4,
+    m.MAV_CMD_WAYPOINT_USER_5,
+)
 
 COMMANDS: tuple[Command, ...] = (
     Command(
@@ -191,6 +230,16 @@ COMMANDS: tuple[Command, ...] = (
         "around it does not reset the count of a jump. A mission of more than "
         f"{MAX_FLOWN_ITEMS} items, counted with all repetitions, is refused. If a jump becomes the present "
         "item, it is executed",
+    ),
+    Command(
+        m.MAV_CMD_DO_JUMP_TAG,
+        "as DO_JUMP, to the JUMP_TAG with the tag p1",
+    ),
+    Command(
+        m.MAV_CMD_JUMP_TAG,
+        "gives the items that follow it a tag, to which DO_JUMP_TAG leads; no other item may have the same",
+        (Number(1, "tag", "tag", "", 0.0, LARGEST_TAG),),
+        read_steps=readers.jump_tag,
     ),
     Command(
         m.MAV_CMD_DO_GRIPPER,
@@ -319,14 +368,7 @@ COMMANDS: tuple[Command, ...] = (
         needs_load=True,
     ),
     *(Command(number, text, handling=Handling.REFUSED) for number, text in _AREA_TEXTS.items()),
-    Command(m.MAV_CMD_DO_SET_MODE, _NOT_SUPPORTED, handling=Handling.REFUSED),
-    Command(m.MAV_CMD_DO_SET_HOME, _NOT_SUPPORTED, handling=Handling.REFUSED),
-    Command(m.MAV_CMD_DO_FLIGHTTERMINATION, _NOT_SUPPORTED, handling=Handling.REFUSED),
-    Command(m.MAV_CMD_DO_PARACHUTE, _NOT_SUPPORTED, handling=Handling.REFUSED),
-    Command(m.MAV_CMD_DO_REPOSITION, _NOT_SUPPORTED, handling=Handling.REFUSED),
-    Command(m.MAV_CMD_DO_ORBIT, _NOT_SUPPORTED, handling=Handling.REFUSED),
-    Command(m.MAV_CMD_DO_PAUSE_CONTINUE, _NOT_SUPPORTED, handling=Handling.REFUSED),
-    Command(m.MAV_CMD_COMPONENT_ARM_DISARM, _NOT_SUPPORTED, handling=Handling.REFUSED),
+    *(Command(number, _NOT_SUPPORTED, handling=Handling.REFUSED) for number in _UNSAFE_TO_IGNORE),
 )
 COMMAND: dict[int, Command] = {row.number: row for row in COMMANDS}
 AREA_COMMANDS = frozenset(_AREA_TEXTS)  # of fence and rally points, which are lists beside the mission

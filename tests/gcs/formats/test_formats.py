@@ -137,7 +137,7 @@ def test_a_plan_is_judged_at_its_planned_home(place: list[float | None] | None, 
 
 def test_what_cannot_be_flown_is_named_with_what_to_do() -> None:
     text = plan_text(
-        TAKEOFF, simple(84), TRIGGER, WAYPOINTS[0], simple(16, 10), simple(31004), simple(201, 2)
+        TAKEOFF, simple(84), TRIGGER, WAYPOINTS[0], simple(16, 10), simple(31009), simple(201, 2)
     )
     judged = mission_of(read_plan(text), HOME, "")
     lines = judged.left_out
@@ -147,9 +147,9 @@ def test_what_cannot_be_flown_is_named_with_what_to_do() -> None:
     assert "frame 10" in lines[1]
     assert list(judged.notes) == [
         "item 2, DO_SET_CAM_TRIGG_DIST (206): kept on the vehicle but not done",
-        "item 5, WAYPOINT_USER_5 (31004): kept on the vehicle but not done",
+        "item 5, SPATIAL_USER_5 (31009): kept on the vehicle but not done",
     ]
-    assert [item.command for item in judged.items] == [22, 206, 16, 31004, 201]
+    assert [item.command for item in judged.items] == [22, 206, 16, 31009, 201]
 
 
 def test_what_is_refused_is_left_out_and_not_kept() -> None:
