@@ -27,6 +27,7 @@ from autopilot.wire.items import (
     read_items,
     unflown_items,
 )
+from autopilot.wire.items.fields import NOT_GIVEN
 from autopilot.wire.items.limits import FASTEST_M_S, LONGEST_S, MAX_FACTORS, MAX_POINTS, MAX_TERMS
 from missions.fileformat import load_mission, shipped
 from missions.model import (
@@ -279,7 +280,11 @@ REFUSALS = [
     ([item(22, frame=6, z=math.nan)], 0, "INVALID_PARAM7", "height above home = nan m"),
     ([item(22, frame=6, z=-1.0)], 0, "INVALID_PARAM7", "height above home = -1 m"),
     ([item(22, frame=0, z=488.0)], 0, "INVALID_PARAM7", "height above home = 0 m"),
-    ([item(16, math.nan, frame=1, z=-5.0)], 0, "INVALID_PARAM1", "hold = nan s"),
+    ([item(16, math.inf, frame=1, z=-5.0)], 0, "INVALID_PARAM1", "hold = inf s"),
+    ([item(19, 2.0, frame=6, y=NOT_GIVEN, z=5.0)], 0, "INVALID_PARAM6_Y", "it is not given"),
+    ([item(19, 2.0, z=5.0)], 0, "UNSUPPORTED_FRAME", "frame 2"),
+    ([item(31, frame=6, z=5.0)], 0, "INVALID", "nothing before it says where the load hangs"),
+    ([UP, item(21, frame=6, x=NOT_GIVEN)], 1, "INVALID_PARAM5_X", "it is not given"),
     ([item(16, -1.0, frame=1, z=-5.0)], 0, "INVALID_PARAM1", "hold = -1 s"),
     ([item(16, frame=1, z=5.0)], 0, "INVALID_PARAM7", "height above home = -5 m"),
     ([item(16, frame=6, x=2**31 - 1, z=5.0)], 0, "INVALID_PARAM5_X", "; it is not given"),
@@ -615,6 +620,24 @@ def test_a_mission_of_jumps_in_jumps_is_refused_before_it_is_long() -> None:
     items = [item(93, 1.0), *(item(177, 0.0, 1000.0) for _ in range(50))]
     with pytest.raises(MissionItemError, match="more than 4000 items"):
         located_steps(items, HOME)
+
+
+@pytest.mark.parametrize("coordinate", [0, NOT_GIVEN])
+def test_a_loiter_without_a_place_is_flown_where_the_load_hangs(coordinate: int) -> None:
+    here = {"frame": 6, "x": coordinate, "y": coordinate}
+    there = item(16, frame=1, x=-70_000, y=120_000, z=-5.0)
+    for command, hold_s in ((19, 8.0), (17, LONGEST_S), (31, 0.0)):
+        assert decode_items([there, item(command, 8.0, **here)], HOME)[1] == Delay(hold_s)
+        moved = decode_items([there, item(command, 8.0, z=9.0, **here)], HOME)[1]
+        assert moved == Waypoint(12.0, -7.0, 9.0, hold_s)
+    _, held, turns = decode_items([there, item(18, 2.0, 0.0, 3.0, **here)], HOME)
+    assert held == Delay(0.0)
+    assert isinstance(turns, Signals)
+
+
+def test_what_is_not_given_is_the_default() -> None:
+    items = [UP, item(21, frame=6, x=NOT_GIVEN, y=NOT_GIVEN), item(16, math.nan, frame=1, z=-5.0)]
+    assert decode_items(items, HOME) == (Takeoff(5.0), Land(), Waypoint(0.0, 0.0, 5.0))
 
 
 def test_loitering() -> None:

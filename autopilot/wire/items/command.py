@@ -12,7 +12,7 @@ from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.trajectory.timeline import MissionState
 from autopilot.wire.convert.geodesy import Home, enu_from_geodetic
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.items.fields import Field
+from autopilot.wire.items.fields import NOT_GIVEN, Field
 from autopilot.wire.items.limits import HOME_ITEM_RADIUS_M
 from autopilot.wire.items.records import (
     ABSOLUTE_FRAMES,
@@ -24,6 +24,8 @@ from autopilot.wire.items.records import (
     wrong_frame,
 )
 from missions.model import HeadingCommand, Step
+
+_NO_PLACE = ((0, 0), (NOT_GIVEN, NOT_GIVEN))  # x and y of an item that names no place
 
 
 def is_home(item: WireItem, origin: Home, home: Vec3) -> bool:
@@ -100,7 +102,7 @@ class ItemContext:
 
     def has_position(self) -> bool:
         """Whether the item names a place."""
-        return self.item.frame in PLACE_FRAMES and (self.item.x, self.item.y) != (0, 0)
+        return self.item.frame in PLACE_FRAMES and (self.item.x, self.item.y) not in _NO_PLACE
 
     def is_home_item(self) -> bool:
         """Whether the item is home as item 0, as MAVProxy and Mission Planner write it, current or not."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import nan
+from math import isnan, nan
 from typing import Any, ClassVar, Protocol
 
 from autopilot.geometry.frames import enu_from_ned, ned_from_enu
@@ -29,6 +29,7 @@ from missions.model import Axis
 WIRE_FIELD = ("param1", "param2", "param3", "param4", "x", "y", "z")
 _WHOLE = (5, 6)
 _INT32_MAX = 2**31 - 1
+NOT_GIVEN = _INT32_MAX  # x or y without a value
 _COUNTS = {1e3: "ms", 1e6: "us"}  # units of x and y by counts per second
 _NO_PLACE_HINT = "; latitude and longitude are 0, so the place may be missing"
 _PARAM_RESULT = (
@@ -73,6 +74,7 @@ class Number:
     none: float | None = None  # the number on the wire that stands for None
     none_means: str = "none"
     magnitude: bool = False  # its sign does not count
+    default: float | None = None  # what NaN means
 
     @property
     def attributes(self) -> tuple[str, ...]:
@@ -82,6 +84,8 @@ class Number:
         sent: float = getattr(item, WIRE_FIELD[self.param - 1])
         if self.none is not None and sent == self.none:
             return (None,)
+        if self.default is not None and isnan(sent):
+            return (self.default,)
         value = abs(sent) if self.magnitude else sent / self.per_unit
         return (check(seq, self.param, self.name, value, self.unit, self.low, self.high),)
 
@@ -102,10 +106,12 @@ class Number:
             longest = _INT32_MAX / self.per_unit
             low, high, counted = max(low, -longest), min(high, longest), f" in {_COUNTS[self.per_unit]}"
         none_text = "" if self.none is None else f", {self.none:g} {self.none_means}"
+        default_text = "" if self.default is None else f", NaN as {self.default:g}"
         return (
             f"{_label(self.param)} {self.name} {low:.6g} ... {high:.6g} {self.unit}".rstrip()
             + counted
             + none_text
+            + default_text
         )
 
 
@@ -227,7 +233,7 @@ class Place:
 
 
 def _check_degrees(seq: int, param: int, name: str, coordinate: int, limit: float) -> None:
-    is_given = coordinate != _INT32_MAX
+    is_given = coordinate != NOT_GIVEN
     degrees, hint = (coordinate * 1e-7, "") if is_given else (nan, "; it is not given")
     check(seq, param, name, degrees, "deg", -limit, limit, hint)
 

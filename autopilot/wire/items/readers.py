@@ -18,8 +18,21 @@ from autopilot.wire.items.limits import (
     SHORTEST_PERIOD_S,
     TURN_ACCEL_M_S2,
 )
-from autopilot.wire.items.records import ABSOLUTE_FRAMES
-from missions.model import Axis, Land, PlaceLoad, Release, Signals, Sine, Speed, Step, Term, Waypoint, Winch
+from autopilot.wire.items.records import ABSOLUTE_FRAMES, GLOBAL_FRAMES
+from missions.model import (
+    Axis,
+    Delay,
+    Land,
+    PlaceLoad,
+    Release,
+    Signals,
+    Sine,
+    Speed,
+    Step,
+    Term,
+    Waypoint,
+    Winch,
+)
 
 
 def waypoint(context: ItemContext) -> Iterator[Step]:
@@ -28,16 +41,46 @@ def waypoint(context: ItemContext) -> Iterator[Step]:
         yield context.record()
 
 
+def loiter(context: ItemContext) -> Iterator[Step]:
+    """A waypoint with its hold, or a hold."""
+    if not context.is_home_item():
+        yield _loiter_step(context, context["hold_s"])
+
+
+def loiter_to_altitude(context: ItemContext) -> Iterator[Step]:
+    """A waypoint, or a transfer straight up or down."""
+    if not context.is_home_item():
+        yield _loiter_step(context, 0.0)
+
+
+def _loiter_step(context: ItemContext, hold_s: float) -> Step:
+    """The way to the place of a loiter and the hold there. An item without a place means where the load hangs
+    then, and without a height too, at this height."""
+    if context.item.frame not in GLOBAL_FRAMES or context.has_position():
+        return Waypoint(context["east_m"], context["north_m"], context["altitude_m"], hold_s)
+    if context.item.z == 0.0:
+        return Delay(hold_s)
+    east, north = _present_place(context)
+    return Waypoint(east, north, context["altitude_m"], hold_s)
+
+
+def _present_place(context: ItemContext) -> tuple[float, float]:
+    """Where the load hangs before the item, east and north."""
+    if context.state.position is None:
+        raise context.refusal("nothing before it says where the load hangs")
+    return context.state.position[:2]
+
+
 def loiter_unlimited(context: ItemContext) -> Iterator[Step]:
     """A waypoint that is held for LONGEST_S."""
     if not context.is_home_item():
-        yield Waypoint(context["east_m"], context["north_m"], context["altitude_m"], LONGEST_S)
+        yield _loiter_step(context, LONGEST_S)
 
 
 def loiter_turns(context: ItemContext) -> Iterator[Step]:
     """A spiral out, turns, a spiral in: an amplitude that rises and falls, times sine and cosine."""
     count, radius = context["turns"], context["radius_m"]
-    yield Waypoint(context["east_m"], context["north_m"], context["altitude_m"])
+    yield _loiter_step(context, 0.0)
     if radius == 0.0 or count == 0.0:
         return
     context.expect_load()
@@ -74,9 +117,7 @@ def change_altitude(context: ItemContext) -> Iterator[Step]:
     sea_level = context.home.altitude_m if context["frame"] in ABSOLUTE_FRAMES else 0.0
     height = context.item.param1 - sea_level
     height = check(context.seq, 1, "height above home", height, "m", LOWEST_M, FARTHEST_M)
-    if context.state.position is None:
-        raise context.refusal("nothing before it says where the load hangs")
-    yield Waypoint(context.state.position[0], context.state.position[1], height)
+    yield Waypoint(*_present_place(context), height)
 
 
 def change_speed(context: ItemContext) -> Iterator[Step]:

@@ -61,7 +61,10 @@ from missions.model import (
 
 _DELAY = (Number(1, "duration_s", "delay", "s", 0.0, LONGEST_S),)
 _POINT = (Place(), Height())
-_HELD_POINT = (Number(1, "hold_s", "hold", "s", 0.0, LONGEST_S), *_POINT)
+_HELD_POINT = (Number(1, "hold_s", "hold", "s", 0.0, LONGEST_S, default=0.0), *_POINT)
+_HERE_TEXT = (
+    "without a place (x and y 0, or not given) at that of the load then, and if z is 0 too, at its height"
+)
 _SPEED_TYPE = {0: "airspeed", 1: "ground speed", 2: "climb", 3: "descent"}
 _SENSE = {0: 0, 1: 1, -1: -1}  # the shorter way, clockwise, counter-clockwise
 _ROI = (Choice(1, "mode", "mode", {mode: mode for mode in (m.MAV_ROI_NONE, m.MAV_ROI_LOCATION)}), Place())
@@ -142,19 +145,27 @@ COMMANDS: tuple[Command, ...] = (
     Command(
         m.MAV_CMD_NAV_SPLINE_WAYPOINT, "as NAV_WAYPOINT", _HELD_POINT, Waypoint, read_steps=readers.waypoint
     ),
-    Command(m.MAV_CMD_NAV_LOITER_TIME, "as NAV_WAYPOINT", _HELD_POINT, Waypoint, read_steps=readers.waypoint),
-    Command(m.MAV_CMD_NAV_LOITER_TO_ALT, "as NAV_WAYPOINT", _POINT, Waypoint, read_steps=readers.waypoint),
+    Command(
+        m.MAV_CMD_NAV_LOITER_TIME, f"as NAV_WAYPOINT; {_HERE_TEXT}", _HELD_POINT, read_steps=readers.loiter
+    ),
+    Command(
+        m.MAV_CMD_NAV_LOITER_TO_ALT,
+        "as NAV_LOITER_TIME, without a hold",
+        _POINT,
+        read_steps=readers.loiter_to_altitude,
+    ),
     Command(
         m.MAV_CMD_NAV_LOITER_UNLIM,
-        "as NAV_WAYPOINT, and the load is held there for a day",
+        "as NAV_LOITER_TIME, for a day",
         _POINT,
         read_steps=readers.loiter_unlimited,
     ),
     Command(
         m.MAV_CMD_NAV_LOITER_TURNS,
-        "the load is carried to the centre, moves out along a spiral of one turn, flies the turns (clockwise "
-        "for a positive radius), and comes back along another spiral. Its speed is the last one that was set "
-        f"({SPEED_M_S:g} m/s if none was), with at most {TURN_ACCEL_M_S2:g} m/s^2 towards the centre",
+        "the load is carried to the centre (as to the place of NAV_LOITER_TIME), moves out along a spiral of "
+        "one turn, flies the turns (clockwise for a positive radius), and comes back along another spiral. "
+        f"Its speed is the last one that was set ({SPEED_M_S:g} m/s if none was), with at most "
+        f"{TURN_ACCEL_M_S2:g} m/s^2 towards the centre",
         (
             Number(1, "turns", "turns", "", 0.0, MAX_TURNS),
             Number(3, "radius_m", "radius", "m", -MAX_RADIUS_M, MAX_RADIUS_M),
@@ -302,8 +313,8 @@ COMMANDS: tuple[Command, ...] = (
     Command(
         m.MAV_CMD_NAV_PAYLOAD_PLACE,
         "the load is carried there, lowered until it lies on the ground, and released; the vehicle "
-        "continues without it. Without a place (x and y 0) the load is placed where it hangs. A descent "
-        "other than 0 that does not reach the ground at the height of home is refused",
+        "continues without it. Without a place (x and y 0, or not given) the load is placed where it hangs. "
+        "A descent other than 0 that does not reach the ground at the height of home is refused",
         (Number(1, "descent_m", "greatest descent", "m", 0.0, FARTHEST_M), *_POINT),
         PlaceLoad,
         is_default=True,
