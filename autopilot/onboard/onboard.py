@@ -50,7 +50,7 @@ from autopilot.onboard.path_work import (
     use_paths,
 )
 from autopilot.onboard.punctuality import Punctuality
-from autopilot.onboard.simulator_parameters import SimulatorParameters
+from autopilot.onboard.simulator_parameters import FAILING_ROTORS, SimulatorParameters
 from autopilot.onboard.snapshot import (
     BATTERY_TIMEOUT_US,
     CoreSnapshot,
@@ -576,6 +576,10 @@ class Onboard:
         name = self._simulator_parameters.receive(message)
         if name is not None:
             self.endpoint.parameter_changed(name)
+        if name == FAILING_ROTORS:  # those of the others that were lost are repaired
+            flight = self.core.flight
+            still_lost = flight.rotors_lost_before & int(self.parameters[name])
+            self.core.replace_flight(replace(flight, rotors_lost_before=still_lost))
 
     def _receive_battery(self, reading: BatteryReading) -> None:
         before = self._snapshot_source.measured.reading

@@ -17,6 +17,7 @@ from autopilot.wire.convert.simulator import SIMULATOR_COMPONENT
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.parameter_table import Parameter, ParameterTable, decimal_from_float32
 
+FAILING_ROTORS = "SIM_ENGINE_FAIL"  # bit i: rotor i+1 fails
 RETRY_US = 500_000
 MAX_LIST_REQUESTS = 6  # requests, after which a silent simulator is assumed to have no parameters
 _MAX_VALUE = 1e9

@@ -82,6 +82,7 @@ def _enter_phase(flight: Flight, phase: Phase, event: Event, view: View, setting
         # another flight begins
         is_failsafe=flight.is_failsafe and phase != Phase.ARMED,
         answered_charge_state=0 if phase == Phase.ARMED else flight.answered_charge_state,
+        rotors_lost_before=0 if phase == Phase.ARMED else flight.rotors_lost_before,
         returning=phase == Phase.RETURN
         or (flight.returning and phase in (Phase.LOWER, Phase.SET_DOWN) and event != Event.LAND),
     )
@@ -105,6 +106,7 @@ def _reset_on_disarm(flight: Flight) -> Flight:
         action_when_armed=ActionWhenArmed.NOTHING,
         heading=flight.heading.at_rest(),
         rotors_lost=0,  # whether they turn is detected after the next start
+        rotors_lost_before=flight.rotors_lost,
         mission=replace(
             mission,
             active=False,

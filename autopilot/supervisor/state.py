@@ -272,6 +272,7 @@ class Flight:
     setpoints: Setpoints = Setpoints()
     area: Area = Area()
     rotors_lost: int = 0  # bit i: rotor i+1 does not obey its commands
+    rotors_lost_before: int = 0  # the same of the last flight
     out_of_control_since_us: int = -1  # since when it is off its path and not controlled, -1: it is not
     fall: Fall = Fall.NONE
     low_battery: LowBattery | None = None  # None: it is not, or not measured
@@ -367,9 +368,8 @@ def can_fly(flight: Flight, settings: Settings) -> bool:
     return not flight.rotors_lost or settings.rotors.can_fly_without(flight.rotors_lost)
 
 
-def lost_rotors_text(flight: Flight) -> str:
-    """The rotors that are lost, by their numbers."""
-    lost = flight.rotors_lost
+def lost_rotors_text(lost: int) -> str:
+    """The rotors that are lost (bits), by their numbers."""
     numbers = [str(i + 1) for i in range(lost.bit_length()) if lost >> i & 1]
     return f"rotor{'s' * (len(numbers) > 1)} {', '.join(numbers)}"
 

@@ -15,6 +15,7 @@ from missions.model import Delay, Land, Takeoff
 from tests.doubles.craft import ACCEPTED, Craft, at_phase
 
 ROUTE = (Takeoff(1.0), Delay(3.0), Land())
+ARM = mavlink.MAV_CMD_COMPONENT_ARM_DISARM
 MOTOR, OFF = mavlink.FAILURE_UNIT_SYSTEM_MOTOR, mavlink.FAILURE_TYPE_OFF
 ROTOR = '[[rotor]]\nx_m = {}\ny_m = {}\nspin = "{}"\n'
 # five in an irregular ring; coaxial pairs at the ends of a cross, the lower ones weaker
@@ -69,6 +70,12 @@ def test_a_hexarotor_that_loses_a_rotor_lands_with_its_load(rotor: int, text: st
     load = craft.truth.x_load
     assert craft.truth.load_on_ground > 0.0
     assert dist(load[:2], over[:2]) < 0.1
+    assert craft.command(ARM, 1.0) == mavlink.MAV_RESULT_DENIED
+    told = "".join(craft.texts[-2:])  # longer than one STATUSTEXT
+    assert told == f"Arming denied: rotor {rotor} did not follow the commands of the last flight"
+    assert craft.command(mavlink.MAV_CMD_INJECT_FAILURE, MOTOR, mavlink.FAILURE_TYPE_OK, rotor) == ACCEPTED
+    craft.wait(0.1)
+    assert craft.command(ARM, 1.0) == ACCEPTED
 
 
 def test_a_quadrotor_says_that_three_cannot_fly_it() -> None:

@@ -241,6 +241,18 @@ def test_a_vehicle_whose_assumed_weight_exceeds_its_thrust_is_not_armed() -> Non
     assert arming_problems(Flight(), view(), settings_with(VEH_LOAD_MASS=0.5, VEH_ROTOR_LIM=0.0)) == ()
 
 
+def test_after_the_loss_of_a_rotor_the_vehicle_is_armed_by_force_only() -> None:
+    sky = Sky()
+    sky.flight = Flight(phase=Phase.ARMED, rotors_lost=0b101)
+    assert sky.ask(R.Arm(False, False)).result == ACCEPTED
+    why = "rotors 1, 3 did not follow the commands of the last flight"
+    assert sky.ask(R.Arm(True, False)).text == f"Arming denied: {why}"
+    assert sky.ask(R.RunPrearmChecks()).text == f"Not ready to arm: {why}"
+    assert sky.ask(R.Arm(True, True)).result == ACCEPTED
+    assert sky.ask(R.Arm(False, False)).result == ACCEPTED
+    assert sky.ask(R.Arm(True, False)).result == ACCEPTED, "it was lost in the last flight but one"
+
+
 def test_what_the_storage_lost_keeps_the_vehicle_from_being_armed() -> None:
     flight = Flight(external_arming_problems={"storage": ("the stored fence is damaged",)})
     after, verdict = decide(flight, R.Arm(True, False), view(), SETTINGS)

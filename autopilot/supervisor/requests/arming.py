@@ -26,6 +26,7 @@ from autopilot.supervisor.state import (
     View,
     fence_problem,
     interrupt_mission,
+    lost_rotors_text,
 )
 from autopilot.supervisor.watches.idle import FAILSAFE_DISARM_US
 from autopilot.wire.dialect import plumbline as mavlink
@@ -50,6 +51,9 @@ def arming_problems(flight: Flight, view: View, settings: Settings) -> tuple[str
         problems.append(f"{found}: hold it still, or wait for less wind")
     if flight.low_battery is not None and flight.is_battery_empty:
         problems.append(f"battery nearly empty, {flight.low_battery.percent} % left")
+    if flight.rotors_lost_before:
+        lost = lost_rotors_text(flight.rotors_lost_before)
+        problems.append(f"{lost} did not follow the commands of the last flight")
     weight_n = settings.weight_n - (settings.load_weight_n if flight.cable.released else 0.0)
     if weight_n >= settings.rotors.greatest_thrust_n:
         problems.append(

@@ -97,7 +97,9 @@ def failure_reason(flight: Flight, view: View, settings: Settings) -> str:
     if error is None or not has_lasted(flight.out_of_control_since_us, OUT_OF_CONTROL_US, view.now_us):
         return ""
     if not can_fly(flight, settings):
-        return f"{lost_rotors_text(flight)} lost, {error.body} {error.distance_m:.1f} m off its path"
+        return (
+            f"{lost_rotors_text(flight.rotors_lost)} lost, {error.body} {error.distance_m:.1f} m off its path"
+        )
     return f"{off_path_text(error, settings)}, out of control"
 
 

@@ -29,7 +29,7 @@ def watch_rotors(flight: Flight, view: View, settings: Settings) -> WatchResult:
         return WatchResult(flight)
     flight = replace(flight, rotors_lost=lost)
     lands = flight.phase in IN_AIR and not is_landing(flight)
-    text = f"Failsafe: {lost_rotors_text(flight)} lost"
+    text = f"Failsafe: {lost_rotors_text(flight.rotors_lost)} lost"
     if not can_fly(flight, settings):
         severity = MAV_SEVERITY_EMERGENCY
         text += ", the others cannot fly it"
