@@ -11,6 +11,7 @@ from collections import deque
 from typing import Any
 
 from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.parameter_encoding import encode_parameter_value
 from autopilot.wire.parameter_table import ParameterError, ParameterTable, decimal_from_float32
 from autopilot.wire.statustext import TextWriter
 from sitl.messages import VEHICLE_SYSTEM
@@ -79,8 +80,7 @@ class ParameterServer:
     def _value(self, name: str) -> Any:
         return mavlink.MAVLink_param_value_message(
             name.encode(),
-            self.table[name],
-            mavlink.MAV_PARAM_TYPE_REAL32,
+            *encode_parameter_value(self.table[name], self.table.describe(name).integer, bytewise=False),
             len(self.table.names),
             self.table.index(name),
         )

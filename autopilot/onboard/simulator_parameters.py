@@ -20,7 +20,7 @@ from autopilot.wire.parameter_table import Parameter, ParameterTable, decimal_fr
 FAILING_ROTORS = "SIM_ENGINE_FAIL"  # bit i: rotor i+1 fails
 RETRY_US = 500_000
 MAX_LIST_REQUESTS = 6  # requests, after which a silent simulator is assumed to have no parameters
-_MAX_VALUE = 1e9
+_MAX_VALUE, _MAX_WHOLE = 1e9, 2.0**24
 
 
 class SimulatorParameters:
@@ -81,10 +81,12 @@ class SimulatorParameters:
             if new:
                 self._table.set(name, value)
             return name if new or was_requested else None
-        if name in self._table or not name.startswith("SIM_") or not abs(value) <= _MAX_VALUE:
+        whole = message.param_type == mavlink.MAV_PARAM_TYPE_INT32 and value.is_integer()
+        limit = _MAX_WHOLE if whole else _MAX_VALUE
+        if name in self._table or not name.startswith("SIM_") or not abs(value) <= limit:
             return None
         text = "Of the simulator, which knows its range"
-        self._table.add_remote(Parameter(name, value, -_MAX_VALUE, _MAX_VALUE, "", text))
+        self._table.add_remote(Parameter(name, value, -limit, limit, "", text, integer=whole))
         saved = self._restored.get(name, value)
         if saved != value:
             self._pending[name] = (saved, 0)

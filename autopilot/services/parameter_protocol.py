@@ -108,7 +108,8 @@ class ParameterService:
         except ParameterError as error:
             why = str(error)
             if name in self.table.remote_names:
-                why = f"{name} = {value:g}; must be a number in its range, which the simulator knows"
+                kind = "a whole number" if self.table.describe(name).integer else "a number"
+                why = f"{name} = {value:g}; must be {kind} in its range, which the simulator knows"
             return self._refused(name, OUT_OF_RANGE, why, peer)
         if name in self.table.remote_names:
             if self.simulator_silent:

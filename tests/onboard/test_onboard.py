@@ -22,6 +22,7 @@ from autopilot.wire.convert.geodesy import Home, geodetic_from_enu
 from autopilot.wire.convert.simulator import read_hil_actuator_controls, read_hil_sensor
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import WireItem
+from autopilot.wire.parameter_encoding import decode_parameter_value, encode_parameter_value
 from gcs.closed_loop import Conditions, build_onboard
 from missions.model import Delay, Land, ReturnHome, Step, Takeoff, Waypoint
 from sitl.hil import HilSimulator
@@ -407,6 +408,24 @@ def test_what_the_simulator_refuses_is_never_said_to_be_set() -> None:
         assert values == [pytest.approx(told)], asked
         refused = "SIM_LOAD_MASS = -5.0 kg; must be 0.001 ... 10"
         assert (refused in craft.texts) == (asked < 0.0)
+
+
+def test_whole_numbers_of_the_simulator_are_int32_too_if_that_is_chosen() -> None:
+    craft = Craft(MAV_PARAM_INT=1.0)
+    craft.wait(1.0)
+    whole, real = mavlink.MAV_PARAM_TYPE_INT32, mavlink.MAV_PARAM_TYPE_REAL32
+    for name, kind, value in (
+        (b"SIM_SENS_FAIL", whole, 64),
+        (b"SIM_BATTERY", whole, 1),
+        (b"SIM_WIND_E", real, 2.5),
+    ):
+        craft.heard.clear()
+        sent = encode_parameter_value(value, kind == whole, bytewise=True)
+        craft.send(mavlink.MAVLink_param_set_message(1, 1, name, *sent))
+        craft.wait(0.1)
+        (answer,) = (one for one in craft.heard if one.get_type() == "PARAM_VALUE")
+        assert answer.param_type == kind
+        assert decode_parameter_value(answer.param_value, kind) == value
 
 
 def test_what_the_simulator_has_not_answered_yet_is_saved_as_it_was_asked_for() -> None:
