@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import cache
 from itertools import accumulate
-from math import nan
+from math import cos, nan, sin
 from typing import Any, get_type_hints
 
 import numpy as np
@@ -153,6 +153,7 @@ def put_instant(
     rotor_min: float,
     rotor_max: float,
     rotors: int,
+    heading: float,
     instant: Row,
 ) -> None:
     """Write an `Instant` into its row.
@@ -161,7 +162,7 @@ def put_instant(
     present leg has this control mode (NO_LEG: there is no leg); `targets[row]` is its setpoint, as
     `layout.jets` returns it, and `requested[row]` the requested path. `load_tracked`: in a phase in which the
     load is tracked. `assumed_load_kg`: mass with which the estimator computes the tension; 0: the tension is
-    that of a custom estimator.
+    that of a custom estimator. `heading` (rad): the commanded one, at which a vehicle without a leg stands.
     """
     for i in range(_FROM_SUMMARY.shape[0]):
         instant[_FROM_SUMMARY[i, 0]] = summary[_FROM_SUMMARY[i, 1]]
@@ -202,5 +203,7 @@ def put_instant(
             instant[_E_X + j] = instant[_E_V + j] = 0.0
     r = control[_R_C : _R_C + 9]
     q = quat_from_rotation(((r[0], r[1], r[2]), (r[3], r[4], r[5]), (r[6], r[7], r[8])))
+    if control_mode == NO_LEG:
+        q = (cos(0.5 * heading), 0.0, 0.0, sin(0.5 * heading))
     for i in range(4):
         instant[_QUAT_C + i] = q[i]

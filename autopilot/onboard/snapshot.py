@@ -358,7 +358,7 @@ class SnapshotSource:
                 constants.duration_s,
                 now_us,
             ),
-            *(constants.phase, seq, *constants.load_and_rotors, instant),
+            *(constants.phase, seq, *constants.load_and_vehicle, instant),
         )
         if self._put is None:
             self._put = entry_point_of(put_instant, *arguments)
@@ -378,7 +378,9 @@ def address_of_instant(constants: InstantConstants, instant: Row) -> int:
         constants.duration_s,
         0,
     )
-    return kernel_address_of(put_instant, *arguments, constants.phase, 0, *constants.load_and_rotors, instant)
+    return kernel_address_of(
+        put_instant, *arguments, constants.phase, 0, *constants.load_and_vehicle, instant
+    )
 
 
 class InstantConstants(NamedTuple):
@@ -396,9 +398,8 @@ class InstantConstants(NamedTuple):
     start_us: int  # when the leg began, or the phase if there is no leg
     duration_s: float
     phase: int
-    load_and_rotors: tuple[
-        bool, float, float, float, int
-    ]  # `load_tracked`, `assumed_load_kg`, `rotor_min`, `rotor_max`, `rotors`
+    # `load_tracked`, `assumed_load_kg`, `rotor_min`, `rotor_max`, `rotors`, `heading`
+    load_and_vehicle: tuple[bool, float, float, float, int, float]
 
 
 def _instant_constants(core: FlightCore, flight: Flight, before: InstantConstants | None) -> InstantConstants:
@@ -431,7 +432,7 @@ def _instant_constants(core: FlightCore, flight: Flight, before: InstantConstant
         start_us,
         float(duration_s),
         int(flight.phase),
-        (flight.phase in CARRYING, load_kg, *limits, len(setup.layout)),
+        (flight.phase in CARRYING, load_kg, *limits, len(setup.layout), flight.heading.angle),
     )
 
 

@@ -69,7 +69,7 @@ _MAX_UNSENT_BYTES = 8 * MAX_STREAMS_BYTES  # bytes of streams without Python
 _MAX_LOGGED_BYTES = 65_536
 MAX_WAITING_WINDOWS = 16  # that can wait to be sent
 # the contents of `TickBatch.limits`
-DURATION_S, ASSUMED_LOAD_KG, ROTOR_MIN, ROTOR_MAX = range(4)
+DURATION_S, ASSUMED_LOAD_KG, ROTOR_MIN, ROTOR_MAX, HEADING = range(5)
 
 TIMESYNC = wire_record(mavlink.MAVLink_timesync_message, __name__)
 
@@ -161,7 +161,7 @@ class BatchBuilder:
         """`battery` is the row of the battery's constants, `writer` that of the answers."""
         self._snapshot_source, self._battery = source, battery
         self._writer, self._lockstep = writer, lockstep
-        self._numbers, self._limits = np.zeros(NUMBERS, np.int64), np.zeros(4)
+        self._numbers, self._limits = np.zeros(NUMBERS, np.int64), np.zeros(5)
         self._instant = np.zeros(width(Instant))
         self._unsent = np.zeros(_MAX_UNSENT_BYTES, np.uint8)
         self._window_ends = np.zeros(MAX_WAITING_WINDOWS, np.int64)
@@ -238,7 +238,7 @@ class BatchBuilder:
             frames.autopilot,
             frames.dialect,
         )
-        load_tracked, load_kg, rotor_min, rotor_max, rotors = constants.load_and_rotors
+        load_tracked, load_kg, rotor_min, rotor_max, rotors, heading = constants.load_and_vehicle
         setpoints_start_us = 0 if setpoints is None else setpoints.first_us
         self._streams = streams
         self._numbers[:] = (
@@ -274,7 +274,7 @@ class BatchBuilder:
             *((NEVER_US, 1) if log is None else (log.due_us, log.period_us)),
             *(0, *self._records.imu_range),
         )
-        self._limits[:] = constants.duration_s, load_kg, rotor_min, rotor_max
+        self._limits[:] = constants.duration_s, load_kg, rotor_min, rotor_max, heading
         return self._assemble(core.law, constants, streams, code)
 
     def warmup_batch(self) -> TickBatch:

@@ -22,6 +22,7 @@ from autopilot.onboard.tick_batch import (
     FIELDS,
     HAS_FIX,
     HAS_SETPOINTS,
+    HEADING,
     IMU_BEGIN,
     IMU_END,
     IMU_SANE,
@@ -222,6 +223,7 @@ def _put_instant(batch: TickBatch, now_us: int) -> None:
             batch.limits[ROTOR_MIN],
             batch.limits[ROTOR_MAX],
             numbers[ROTORS],
+            batch.limits[HEADING],
             streams.instant,
         ),
     )

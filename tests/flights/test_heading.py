@@ -223,6 +223,8 @@ def test_a_vehicle_that_landed_takes_off_again_with_the_heading_it_has() -> None
     assert craft.command(m.MAV_CMD_NAV_LAND) == ACCEPTED
     craft.run(at_phase(Phase.DISARMED))
     assert nose(craft) == pytest.approx(0.5 * math.pi, abs=0.05)
+    told = rotation_from_quat(craft.onboard.log_sample().snapshot.quat_c_wxyz)
+    assert heading_of(told) == pytest.approx(0.5 * math.pi), "as it stands, and not east"
     assert craft.command(m.MAV_CMD_CONDITION_YAW, 0.0) == m.MAV_RESULT_TEMPORARILY_REJECTED
     assert craft.command(m.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, 0, 0, 0, 2.0) == ACCEPTED
     assert craft.command(m.MAV_CMD_COMPONENT_ARM_DISARM, 1.0) == ACCEPTED
