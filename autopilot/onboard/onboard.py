@@ -6,7 +6,7 @@ wait until the shell hands them over between two ticks.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -113,6 +113,7 @@ from autopilot.trajectory.prepare import AT_HOME, PENDING, PathLimits, PreparedP
 from autopilot.vehicle.parameters import AutopilotParameters
 from autopilot.vehicle.rates import RateError, control_divider
 from autopilot.wire.codec import FrameWriter, layout_of
+from autopilot.wire.command_names import command_name
 from autopilot.wire.compiled import MAX_FRAME_BYTES, MAX_PAYLOAD_BYTES
 from autopilot.wire.convert.battery import NO_READING, BatteryReading, read_battery_status
 from autopilot.wire.convert.geodesy import Home, enu_from_geodetic
@@ -137,6 +138,7 @@ MIN_GAP_US = 500_000  # time without a tick after which a vehicle in the air has
 RATE_TICKS = 1  # ticks in which the tick rate is determined
 # ticks in a row in the past or far ahead, after which the clock is assumed to have changed
 CLOCK_CHANGE_TICKS = 3
+_MAX_NAMED_COMMANDS = 3  # in one text
 _SIMULATOR, _GROUND_STATION = "simulator", "ground station"  # sources of reasons that prevent arming
 HOME_TOLERANCE_M = 1.0  # between the homes of simulator and autopilot: digits may have been left out
 MIN_THRUST_SHARE = 0.3  # share of the vehicle's weight: rotors commanded to less did not carry it
@@ -191,6 +193,18 @@ def build_setup(table: AutopilotParameters, control_every: int, own: OwnCode = N
         rotor_watch=believed_rotor_watch(table),
         factor_share=believed_factor_share(table),
     )
+
+
+def _named_items(items: Sequence[WireItem], numbers: Sequence[int]) -> str:
+    """The first commands of these items, each with the numbers of its items."""
+    by_command: dict[int, list[int]] = {}
+    for number in numbers:
+        by_command.setdefault(items[number].command, []).append(number)
+    named = [
+        f"{command_name(command)} (item{'s' if len(found) > 1 else ''} {listed(found)})"
+        for command, found in by_command.items()
+    ]
+    return ", ".join([*named[:_MAX_NAMED_COMMANDS], *["..."] * (len(named) > _MAX_NAMED_COMMANDS)])
 
 
 def mission_plan(
@@ -888,8 +902,7 @@ class Onboard:
         self._prepare()
         unflown = unflown_items(mission.items)
         if unflown:
-            items = "item" if len(unflown) == 1 else "items"
-            text = f"Kept, but not flown: {items} {listed(unflown)}"
+            text = f"Kept, but not flown: {_named_items(mission.items, unflown)}"
             self.endpoint.send_text(mavlink.MAV_SEVERITY_INFO, text)
         early = zip(plan.steps[:-1], plan.sequence, strict=False)  # all steps but the last
         landing = next((item for step, item in early if isinstance(step, Land)), None)

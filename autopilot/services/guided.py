@@ -12,7 +12,7 @@ import math
 from typing import Any
 
 from autopilot.geometry.frames import enu_from_ned, flu_from_frd
-from autopilot.geometry.linear import Vec3
+from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.services.records import Decide, Output, Peer, SendText, Verdict
 from autopilot.services.requests import (
     FollowAttitude,
@@ -70,14 +70,24 @@ def _yaw_rate(m: Any) -> float:
     return math.nan if m.type_mask & _NO_YAW_RATE else -m.yaw_rate
 
 
+def _moves_nothing(mask: int) -> bool:
+    """Whether no position, velocity or acceleration is to be used."""
+    return all(mask & bits == bits for bits in (_POSITION_BITS, _VELOCITY_BITS, _ACCELERATION_BITS))
+
+
+def _velocity(m: Any) -> Vec3:
+    """The requested velocity, NED or body FRD; zero if only the heading is to change."""
+    return ZERO if _moves_nothing(m.type_mask) else _masked((m.vx, m.vy, m.vz), m.type_mask, 3)
+
+
 def _problem(m: Any, position: tuple[float, float, float]) -> str:
     """Why a position setpoint cannot be used, or an empty string."""
     mask = m.type_mask
     # the bit makes the accelerations forces, if any is used; MAVProxy sets it and uses none
     if mask & _FORCE and mask & _ACCELERATION_BITS != _ACCELERATION_BITS:
         return "Setpoint refused: forces are not followed"
-    if all(mask & bits == bits for bits in (_POSITION_BITS, _VELOCITY_BITS, _ACCELERATION_BITS)):
-        return "Setpoint refused: neither position nor velocity nor acceleration is asked for"
+    if _moves_nothing(mask) and math.isnan(_heading(m)) and math.isnan(_yaw_rate(m)):
+        return "Setpoint refused: no position, velocity, acceleration or yaw is asked for"
     used = ((position, 0), ((m.vx, m.vy, m.vz), 3), ((m.afx, m.afy, m.afz), 6))
     if any(_has_invalid_value(values, mask, shift) for values, shift in used):
         return "Setpoint refused: a used value is not a number"
@@ -99,7 +109,7 @@ def read_local(m: Any) -> FollowSetpoint | Verdict:
     convert = flu_from_frd if body else enu_from_ned
     return FollowSetpoint(
         convert(_masked(position, mask, 0)),
-        convert(_masked((m.vx, m.vy, m.vz), mask, 3)),
+        convert(_velocity(m)),
         convert(_masked((m.afx, m.afy, m.afz), mask, 6)),
         relative=frame != mavlink.MAV_FRAME_LOCAL_NED,
         body=body,
@@ -125,7 +135,7 @@ def read_global(m: Any, home: Home) -> FollowSetpoint | Verdict:
     height = m.alt - home.altitude_m if frame in _ABOVE_SEA else m.alt
     return FollowSetpoint(
         enu_from_ned(_masked((north, east, -height), mask, 0)),
-        enu_from_ned(_masked((m.vx, m.vy, m.vz), mask, 3)),
+        enu_from_ned(_velocity(m)),
         enu_from_ned(_masked((m.afx, m.afy, m.afz), mask, 6)),
         relative=False,
         heading_rad=_heading(m),

@@ -502,10 +502,20 @@ def test_items_behind_a_landing_are_reported(behind: tuple[Step, ...]) -> None:
     assert (told in found) == bool(behind)
 
 
-@pytest.mark.parametrize(("count", "items"), [(1, "item 1"), (2, "items 1, 2")])
-def test_items_that_are_kept_but_not_flown_are_named(count: int, items: str) -> None:
-    camera = WireItem(2, mavlink.MAV_CMD_DO_SET_CAM_TRIGG_DIST, 0, 1, 25.0, 0.0, 0.0, 0.0, 0, 0, 0.0)
-    craft = Craft(Takeoff(2.0), *[camera] * count, Land())
+@pytest.mark.parametrize(
+    ("commands", "items"),
+    [
+        ((206,), "DO_SET_CAM_TRIGG_DIST (item 1)"),
+        ((206, 203, 206), "DO_SET_CAM_TRIGG_DIST (items 1, 3), DO_DIGICAM_CONTROL (item 2)"),
+        (
+            (203, 205, 181, 183),
+            "DO_DIGICAM_CONTROL (item 1), DO_MOUNT_CONTROL (item 2), DO_SET_RELAY (item 3), ...",
+        ),
+    ],
+)
+def test_items_that_are_kept_but_not_flown_are_named(commands: tuple[int, ...], items: str) -> None:
+    kept = [WireItem(2, command, 0, 1, 25.0, 0.0, 0.0, 0.0, 0, 0, 0.0) for command in commands]
+    craft = Craft(Takeoff(2.0), *kept, Land())
     found = [(text.severity, text.text) for text in craft.onboard.endpoint.kept_texts.texts]
     assert (mavlink.MAV_SEVERITY_INFO, f"Kept, but not flown: {items}") in found
 

@@ -94,6 +94,7 @@ def test_global_setpoints_are_above_home_or_above_the_sea():
     [
         local(2, POSITION),
         local(1, 0xFFF),
+        local(1, 0xBFF, yaw=math.nan),
         local(1, POSITION, math.nan),
         local(1, VELOCITY, vx=math.inf),
         local(1, 0x200, 1.0),  # a force
@@ -142,6 +143,20 @@ def test_yaw_is_from_north_and_clockwise(mask, yaw, rate, heading, turning):
     for asked in (read_local(local(1, mask, yaw=yaw, rate=rate)), read_global(globally, HOME)):
         assert isinstance(asked, FollowSetpoint)
         assert same((asked.heading_rad, asked.yaw_rate_rad_s), (heading, turning))
+
+
+def test_a_yaw_alone_is_turned_to_on_the_spot():
+    for mask, heading, turning in ((0xBFF, 0.0, math.nan), (0x7FF, math.nan, -0.3)):
+        place = {"lat_int": 0, "lon_int": 0, "alt": math.nan}
+        globally = m.MAVLink_set_position_target_global_int_message(
+            0, 1, 1, 6, mask, *place.values(), *[math.nan] * 6, 0.5 * math.pi, 0.3
+        )
+        locally = local(1, mask, math.nan, vx=math.nan, yaw=0.5 * math.pi, rate=0.3)
+        for asked in (read_local(locally), read_global(globally, HOME)):
+            assert isinstance(asked, FollowSetpoint)
+            assert asked.velocity == (0.0, 0.0, 0.0)
+            assert all(map(math.isnan, (*asked.position, *asked.accel)))
+            assert same((asked.heading_rad, asked.yaw_rate_rad_s), (heading, turning))
 
 
 def test_an_attitude_has_a_heading():

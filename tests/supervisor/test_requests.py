@@ -264,6 +264,12 @@ def test_a_vehicle_that_stands_still_and_sees_is_ready() -> None:
     assert decide(Flight(), R.RunPrearmChecks(), view(), SETTINGS)[1] == Verdict(ACCEPTED, "Ready to arm")
 
 
+@pytest.mark.parametrize("phase", [Phase.ARMED, Phase.HOLD])
+def test_an_armed_vehicle_does_not_check_whether_it_may_be_armed(phase: Phase) -> None:
+    verdict = decide(Flight(phase=phase), R.RunPrearmChecks(), view(), SETTINGS)[1]
+    assert (verdict.result, verdict.text) == (LATER, "Pre-arm checks denied: armed")
+
+
 def test_who_disarms_a_disarmed_vehicle_withdraws_what_would_begin() -> None:
     sky = Sky()
     assert sky.ask(R.Takeoff(2.0)).result == ACCEPTED

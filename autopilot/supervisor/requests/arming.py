@@ -102,6 +102,8 @@ def arm(flight: Flight, request: Arm, view: View, settings: Settings) -> Decisio
 
 def run_checks(flight: Flight, request: RunPrearmChecks, view: View, settings: Settings) -> Decision:
     """Report what keeps the vehicle from being armed, as a warning, by which clients recognise a reason."""
+    if flight.phase not in UNARMED:
+        return flight, temporarily_denied("Pre-arm checks denied: armed")
     problems = arming_problems(flight, view, settings)
     text = f"Not ready to arm: {'; '.join(problems)}" if problems else "Ready to arm"
     return flight, Verdict(mavlink.MAV_RESULT_ACCEPTED, text, warns=bool(problems))
