@@ -48,11 +48,22 @@ def pings(first: int, count: int) -> bytes:
     return b"".join(writer.frame(m.MAVLink_ping_message(0, seq, 0, 0)) for seq in range(first, first + count))
 
 
+class Watch:
+    """A clock that moves only while a datagram is handled."""
+
+    def __init__(self) -> None:
+        self.now_s = 0.0
+
+    def perf_counter(self) -> float:
+        return self.now_s
+
+
 class Slow:
     """An onboard software that is slow with each datagram."""
 
-    def __init__(self) -> None:
+    def __init__(self, watch: Watch) -> None:
         self.now_us = 0
+        self._watch = watch
         self.heard: list[tuple[Any, list[int]]] = []
         self.links: list[Any] = []
         self.said: list[tuple[Any, bytes]] = []
@@ -62,9 +73,7 @@ class Slow:
         self.links.append(link)
 
     def receive_ground(self, datagram: bytes, link: Any, program: bool = False) -> list[Any]:
-        until = time.perf_counter() + SLOW_S
-        while time.perf_counter() < until:
-            pass
+        self._watch.now_s += SLOW_S
         self.heard.append((link, [received.message.seq for received in decode(datagram)[0]]))
         return []
 
@@ -76,8 +85,8 @@ class Slow:
 class Ground:
     """Sockets of an autopilot for two ground stations and TCP."""
 
-    def __init__(self, tcp: TcpServer, address: tuple[str, int]) -> None:
-        self.onboard: Any = Slow()
+    def __init__(self, tcp: TcpServer, address: tuple[str, int], watch: Watch) -> None:
+        self.onboard: Any = Slow(watch)
         self.address = address
         self.peers = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(2)]
         for peer in self.peers:
@@ -113,12 +122,14 @@ class Ground:
 
 
 @pytest.fixture
-def ground() -> Iterator[Callable[[], Ground]]:
+def ground(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[], Ground]]:
     made: list[Ground] = []
+    watch = Watch()
+    monkeypatch.setattr(time, "perf_counter", watch.perf_counter)
 
     def make() -> Ground:
         address = (LOOPBACK, free_port())
-        made.append(Ground(listen(address), address))
+        made.append(Ground(listen(address), address, watch))
         return made[-1]
 
     yield make

@@ -15,7 +15,7 @@ from autopilot.services.requests import Winch as WinchRequest
 from autopilot.supervisor.state import Flight, Phase, leg_time_s
 from autopilot.wire.dialect import plumbline as mavlink
 from missions.model import Delay, Land, Takeoff, Winch
-from tests.doubles.sky import ACCEPTED, SETTINGS, Sky, entered
+from tests.doubles.sky import ACCEPTED, Sky, entered
 
 DENIED, LATER = mavlink.MAV_RESULT_DENIED, mavlink.MAV_RESULT_TEMPORARILY_REJECTED
 
@@ -107,7 +107,6 @@ def test_the_length_is_that_of_the_leg_also_while_it_is_stopped() -> None:
     assert stopped.cable.reel_rate == 0.0
     resting = replace(flight, legs=(Hold((0.0, 0.0, 2.0)),))
     assert commanded_rate(resting, 0, 0.004) == 0.0
-    assert SETTINGS.winch.max_length_m == 3.0
 
 
 def test_while_the_winch_works_no_stream_takes_over() -> None:
