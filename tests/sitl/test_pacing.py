@@ -114,6 +114,85 @@ def test_a_clock_that_was_stopped_is_not_a_busy_machine(monkeypatch: pytest.Monk
     assert "stalled" not in paced.pacing.summary(0)
 
 
+class Ended(Exception):
+    """The simulator was told to stop."""
+
+
+class SilentPilot:
+    """The link to an autopilot that answers at once, except for one silence; time passes only here and in
+    sleeps."""
+
+    peer = ("127.0.0.1", 1)
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, silent_at: int, silent_s: float, ticks: int) -> None:
+        self.now_ns = 100 * SECOND
+        self.said: list[str] = []
+        self._silent_at, self._silence_ns, self._ticks = silent_at, round(silent_s * SECOND), ticks
+        self._until_ns, self._timeout_ns = 0, 0
+        time = SimpleNamespace(
+            sleep=self._sleep, perf_counter_ns=self._perf_counter_ns, monotonic=lambda: self.now_ns / SECOND
+        )
+        monkeypatch.setattr(loops, "time", time)
+        parameters = SimpleNamespace(send_text=lambda text, severity: self.said.append(text))
+        self.simulator: Any = SimpleNamespace(
+            tick_us=4000, pacing=None, parameters=parameters, ticks=0, answered=False, now_us=0
+        )
+        self.simulator.sensor_datagram = lambda: b""
+        self.simulator.advance = self._advance
+
+    def _sleep(self, seconds: float) -> None:
+        self.now_ns += round(seconds * SECOND) + 1000
+
+    def _perf_counter_ns(self) -> int:
+        self.now_ns += 1000
+        return self.now_ns
+
+    def _advance(self) -> None:
+        self.simulator.answered = False
+        self.simulator.ticks += 1
+        if self.simulator.ticks == self._silent_at:
+            self._until_ns = self.now_ns + self._silence_ns
+
+    def check(self) -> None:
+        """The request to stop."""
+        self.now_ns += 1000
+        if self.simulator.ticks == self._ticks:
+            raise Ended
+
+    def timeout(self, seconds: float) -> None:
+        self._timeout_ns = round(seconds * SECOND)
+
+    def gather_truth(self, simulator: object) -> None:
+        """The truth has no receiver."""
+
+    def send(self, datagram: bytes) -> None:
+        """It is answered by `receive`."""
+
+    def receive(self) -> tuple[bytes, Any] | None:
+        if self.now_ns + self._timeout_ns < self._until_ns:
+            self.now_ns += self._timeout_ns
+            return None
+        self.now_ns = max(self.now_ns, self._until_ns)
+        return b"", self.peer
+
+    def process(self, datagram: bytes, sender: object, simulator: object) -> bool:
+        self.simulator.answered = True
+        return False
+
+
+@pytest.mark.parametrize("silent_s", [1.4, 60.0])
+def test_a_wait_for_the_autopilot_is_told_and_is_no_busy_machine(
+    monkeypatch: pytest.MonkeyPatch, silent_s: float
+) -> None:
+    link: Any = SilentPilot(monkeypatch, 300, silent_s, 1000)
+    pacing = Pacing(1.0)
+    with pytest.raises(Ended):
+        loops.run_lockstep(link, link.simulator, link, link.said.append, pacing)
+    told = [text for text in link.said if "autopilot at" not in text]
+    assert told == [f"waited {silent_s:.1f} s for the autopilot"]
+    assert pacing.figures.rate_hz == pytest.approx(250.0, rel=0.01)
+
+
 @pytest.mark.parametrize("speed", [1.0, 4.0])
 def test_a_machine_that_is_too_slow_for_the_clock_is_told(
     monkeypatch: pytest.MonkeyPatch, speed: float
