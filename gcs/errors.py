@@ -41,6 +41,10 @@ class NoVehicleError(GcsError):
     """No vehicle answered, or it stopped answering."""
 
 
+class NotInTimeError(GcsError):
+    """The vehicle answers, but what is waited for has not happened within the time limit."""
+
+
 class StoppedError(GcsError):
     """The user stopped the command before it had a result."""
 

@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 try:
+    from gcs.errors import NotInTimeError, NoVehicleError
     from missions.errors import Error
     from missions.model import (
         AttitudeRun,
@@ -62,6 +63,8 @@ __all__ = [
     "Flight",
     "Land",
     "Mission",
+    "NoVehicleError",
+    "NotInTimeError",
     "PlaceLoad",
     "Release",
     "ReturnHome",

@@ -24,7 +24,7 @@ from gcs.clients.modes import ALIASES, MODES, change_mode
 from gcs.clients.operation import Operation
 from gcs.clients.parameter_transfer import ParameterGet, ParameterSet
 from gcs.clients.vehicle_view import VehicleView
-from gcs.errors import GcsError, NoVehicleError, RefusedError
+from gcs.errors import GcsError, NotInTimeError, NoVehicleError, RefusedError
 from gcs.shell.link import monotonic_us, parse_address
 from gcs.shell.session import Session
 from gcs.workflows.parameters import exchange
@@ -98,7 +98,8 @@ def connect(
     `udpout:HOST:PORT` to send first, `tcp:HOST:PORT` to connect by TCP (`autopilot --tcp`). `sysid`: the
     MAVLink system id of the vehicle, if several send there; without it the first one that is heard.
     `timeout_s`: how long the vehicle may be silent, now and later, by the clock of this machine.
-    `signing_key`: 32 bytes with which messages are signed (docs/mavlink.md). `Error` if no vehicle is heard.
+    `signing_key`: 32 bytes with which messages are signed (docs/mavlink.md). `NoVehicleError` if no vehicle
+    is heard.
     """
     limit_s = positive("timeout_s", timeout_s)
     if signing_key is not None and not (isinstance(signing_key, bytes) and len(signing_key) == KEY_BYTES):
@@ -161,7 +162,7 @@ class RunningVehicle:
         time refuses, with the reason."""
         limit_s = positive("timeout_s", timeout_s)
         if not force and self.state.ready_to_arm is not True:
-            with suppress(NoVehicleError):  # the refusal gives the reason
+            with suppress(NotInTimeError, NoVehicleError):  # the refusal gives the reason
                 self.wait("ready", limit_s)
         self._command(lambda session: command.arm(session.target, force))
         self._finish(lambda state: state.armed is True, "arm", limit_s)
@@ -205,8 +206,8 @@ class RunningVehicle:
 
         The load has arrived when its path has ended, within 0.1 m of the position, and it is slower than
         0.1 m/s. A mission that is being flown ends. After a release the position is that of the vehicle.
-        `Error`, with the distance that is left, if it has not arrived within `timeout_s`, or if it is held
-        away from the position, as by a strong wind, and comes no closer for 30 s.
+        `NotInTimeError`, with the distance that is left, if it has not arrived within `timeout_s`, and
+        `Error` if it is held away from the position, as by a strong wind, and comes no closer for 30 s.
         """
         height_m = None if up_m is None else number("up_m", up_m)
         place = (number("east_m", east_m), number("north_m", north_m), height_m)
@@ -326,9 +327,9 @@ class RunningVehicle:
 
         `until`: one of `ready`, `holding` (at rest: the stop, or the way to a place, has ended), `mission
         complete` and `landed` (disarmed), a function of the state, or a number of seconds (0 or more) of the
-        vehicle's clock. `Error` if the condition does not hold within `timeout_s` seconds of the vehicle's
-        clock (for a number of seconds there is no limit), or if the vehicle is disarmed or falls silent
-        before.
+        vehicle's clock. `NotInTimeError` if the condition does not hold within `timeout_s` seconds of the
+        vehicle's clock (for a number of seconds there is no limit), `NoVehicleError` if the vehicle falls
+        silent before, and `Error` if it is disarmed before.
         """
         condition, what = self._condition(until)
         checked_s = positive("timeout_s", timeout_s)
@@ -366,34 +367,36 @@ class RunningVehicle:
         session, clock = self._session, _Clock()
         was_armed, texts_before = self.state.armed, len(session.view.texts)
         found: list[State] = []
-        problems: list[str] = []
+        problems: list[GcsError] = []
 
         def is_over() -> bool:
             state = self.state
             if condition(state):
                 found.append(state)
             elif session.lost:
-                problems.append(f"the vehicle fell silent for {self._timeout_s:g} s")
+                problems.append(NoVehicleError(f"the vehicle fell silent for {self._timeout_s:g} s"))
             elif was_armed and not state.armed:
-                problems.append("the vehicle was disarmed")
+                problems.append(GcsError("the vehicle was disarmed"))
             elif way is not None and way.has_ended_elsewhere(state):
                 limits = f"must be within {_NEAR_M:g} m and slower than {_SLOW_M_S:g} m/s"
                 since = f"its way has ended, and for {_HELD_AWAY_S:g} s it has come no closer"
-                problems.append(f"{way.remaining(state)} ({limits}): {since}")
+                problems.append(GcsError(f"{way.remaining(state)} ({limits}): {since}"))
             elif clock.elapsed_s(state) > timeout_s:
                 where = way.remaining(state) if way is not None else f"phase {state.phase or 'not known'}"
-                problems.append(f"not within {timeout_s:g} s of the vehicle's clock: {where}")
+                text = f"not within {timeout_s:g} s of the vehicle's clock: {where}"
+                problems.append(NotInTimeError(text))
             elif clock.stalled_s > _MAX_STALL_S:
-                problems.append(f"the vehicle's clock stands still for {_MAX_STALL_S:g} s; is sitl running?")
+                text = f"the vehicle's clock stands still for {_MAX_STALL_S:g} s; is sitl running?"
+                problems.append(NoVehicleError(text))
             elif self._closing.is_set():
-                problems.append("the link was closed")
+                problems.append(GcsError("the link was closed"))
             return bool(found or problems)
 
         session.watch(is_over, None)
         if found:
             return found[-1]
         reasons = session.view.problems_since(texts_before)
-        raise NoVehicleError("; ".join([f"waiting for {what}: {problems[0]}", *reasons]))
+        raise type(problems[0])("; ".join([f"waiting for {what}: {problems[0]}", *reasons]))
 
     # ---- the thread of the link
 

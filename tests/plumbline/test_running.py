@@ -247,6 +247,27 @@ def test_a_wait_ends_with_what_the_last_command_began(until: str, under_way: Any
         assert (vehicle.wait(until).time_s or 0.0) >= 5.0
 
 
+class LostSession(ReportingSession):
+    """A session whose vehicle has fallen silent."""
+
+    lost = True
+
+
+def test_why_a_wait_has_no_end_is_told_by_the_class_of_the_error() -> None:
+    def wait(session: ReportingSession) -> BaseException:
+        with (
+            RunningVehicle(session, 1.0) as vehicle,  # type: ignore[arg-type]
+            pytest.raises(plumbline.Error) as told,
+        ):
+            vehicle.wait("mission complete", timeout_s=20.0)
+        return told.value
+
+    assert type(wait(ReportingSession(ARMED, at=lambda _: ACTIVE))) is plumbline.NotInTimeError
+    assert type(wait(LostSession(ARMED, at=lambda _: ACTIVE))) is plumbline.NoVehicleError
+    disarmed = wait(ReportingSession(ARMED, at=lambda time_s: ACTIVE if time_s < 5.0 else DISARMED))
+    assert not isinstance(disarmed, plumbline.NotInTimeError | plumbline.NoVehicleError)
+
+
 class SlowlyReportingSession(ReportingSession):
     """A session with a vehicle that does at once what it is told, and reports its phase only if asked."""
 
@@ -352,7 +373,7 @@ def test_a_vehicle_that_is_only_kept_level_does_not_hold() -> None:
     session = ReportingSession(ARMED, at=lambda time_s: in_hold(time_s, nan, level))
     with (
         RunningVehicle(session, 1.0) as vehicle,  # type: ignore[arg-type]
-        pytest.raises(plumbline.Error, match="not within 2 s of the vehicle's clock"),
+        pytest.raises(plumbline.NotInTimeError, match="not within 2 s of the vehicle's clock"),
     ):
         vehicle.wait("holding", timeout_s=2.0)
 
@@ -383,7 +404,7 @@ def test_what_position_commands_refer_to_is_awaited(
         vehicle.goto(*here, timeout_s=2.0)
         what = "load" if control_mode == LOAD_POSITION else "vehicle"
         left = f"not within 2 s of the vehicle's clock: {what} 1.00 m from the goal at 0.00 m/s, phase hold"
-        with pytest.raises(plumbline.Error, match=f"waiting for goto: {left}"):
+        with pytest.raises(plumbline.NotInTimeError, match=f"waiting for goto: {left}"):
             vehicle.goto(here[0], here[1], here[2] + 1.0, timeout_s=2.0)
     for height_m in (here[2], None):  # without a height it keeps the one that it has
         move = reposition(session, (here[0], here[1] + 2.0, height_m), False, None)  # type: ignore[arg-type]
