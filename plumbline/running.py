@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import queue
 import threading
+import warnings
 from collections.abc import Callable
 from concurrent.futures import Future, wait
 from contextlib import suppress
@@ -41,6 +42,7 @@ from plumbline.arguments import (
     number,
     parameter_name,
     positive,
+    reworded_for_python,
     shown_value,
     text,
     whole_number,
@@ -110,7 +112,13 @@ def connect(
         found = parse_address(text("address", address, "udpin:127.0.0.1:14550"))
         system = None if sysid is None else whole_number("sysid", sysid, 1, 255)
         where = replace(found, signing_key=signing_key, system=system)
-        return RunningVehicle(Session(where, limit_s, round(limit_s * 1e6)), limit_s)
+        session = Session(where, limit_s, round(limit_s * 1e6), _warn, quiet=True)
+        return RunningVehicle(session, limit_s)
+
+
+def _warn(line: str) -> None:
+    """Warn of what may not be meant, in the thread of the link: no line of the script is to blame."""
+    warnings.warn(reworded_for_python(line), stacklevel=2)
 
 
 class RunningVehicle:
@@ -242,14 +250,21 @@ class RunningVehicle:
     ) -> None:
         """Upload a mission to the vehicle: a shipped name, a file (.toml, .plan, .waypoints), or a `Mission`.
 
-        The mission is first checked against the limits of `vehicle`, unless `force`.
+        The mission is first checked against the limits of `vehicle`, unless `force`. What the vehicle does
+        not fly as in a file of another ground station causes a warning.
         """
         if isinstance(mission, model.Mission) and not isinstance(mission, Mission):
             mission = Mission(mission.name, mission.steps, mission.title)
         path, checked = name_or_path("mission", mission), name_or_path("vehicle", vehicle)
+        notes: list[str] = []
         with errors_for_python():
-            send = checked_upload(path, checked, force, False, lambda _: None)
-        self._with_retries(lambda: send(self._session))
+            send = checked_upload(path, checked, force, False, lambda _: None, notes.append, quiet=True)
+        try:
+            with errors_for_python():
+                self._with_retries(lambda: send(self._session))
+        finally:
+            for line in dict.fromkeys(notes):
+                warnings.warn(reworded_for_python(line), stacklevel=3)
         self._with_retries(self._show_state)
 
     def start(self) -> None:

@@ -31,10 +31,19 @@ OnDatagram = Callable[[bytes, int], None]  # called with a datagram and its time
 
 
 class Session:
-    """One vehicle; `view` is what it has reported."""
+    """One vehicle; `view` is what it has reported.
+
+    `note` gets a line about each other vehicle at this address. Unless `quiet`, what takes long is shown on
+    stderr.
+    """
 
     def __init__(
-        self, address: Address, find_s: float | None = None, link_timeout_us: int = LINK_TIMEOUT_US
+        self,
+        address: Address,
+        find_s: float | None = None,
+        link_timeout_us: int = LINK_TIMEOUT_US,
+        note: Callable[[str], None] = notify,
+        quiet: bool = False,
     ) -> None:
         self.view = VehicleView()
         self.address = address
@@ -48,7 +57,8 @@ class Session:
         self._connection.accept_only(address.system)
         if address.signing_key is not None:
             self._connection.sign_with(Signing(address.signing_key, timestamp_of(unix_us())))
-        self._socket = VehicleSocket(address)
+        self._socket = VehicleSocket(address, note)
+        self._quiet = quiet
 
     @property
     def target(self) -> Target:
@@ -137,7 +147,7 @@ class Session:
     ) -> bool:
         """Listen until `done` or until the time has passed (None: no limit); True if done."""
         until_us = None if seconds is None else monotonic_us() + round(seconds * 1e6)
-        with StepDisplay(label) as display:
+        with StepDisplay(label, self._quiet) as display:
             while not done():
                 now_us = monotonic_us()
                 if until_us is not None and now_us >= until_us:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from autopilot.wire.dialect import plumbline as mavlink
 from gcs.clients.connection import is_vehicle
 from gcs.clients.datagrams import messages
@@ -19,8 +21,9 @@ class VehicleSocket:
     """Receives from the vehicle that the address names, else from the one whose heartbeat arrives first, and
     from senders that are no vehicles; sends to the vehicle."""
 
-    def __init__(self, address: Address) -> None:
+    def __init__(self, address: Address, note: Callable[[str], None] = notify) -> None:
         self._address = address
+        self._note = note  # called with a line about each vehicle that is ignored
         self._socket = open_address(address)
         self._vehicle: Sender | None = None
         self._system: int | None = None  # id of the vehicle
@@ -98,7 +101,7 @@ class VehicleSocket:
         self._other_heard_us[sender] = now_us
 
     def _report_others(self) -> None:
-        """Print once for each that it is another vehicle, now that the first one is still sending."""
+        """Say once for each that it is another vehicle, now that the first one is still sending."""
         if self._address.system is not None:  # they are ignored on purpose
             return
         for sender, system in self._others.items():
@@ -107,7 +110,7 @@ class VehicleSocket:
                 other, ours = (f"{host}:{port}" for host, port in (sender, self._vehicle or sender))
                 is_twin = system == self._system
                 choice = "give one another id (MAV_SYS_ID)" if is_twin else "choose with --sysid"
-                notify(
+                self._note(
                     f"another vehicle (system {system}) speaks on {self._address.link} from {other} and is "
                     f"not heard, nor does it hear what is said to {ours}; {choice}, or give each "
                     "a port of its own: autopilot --gcs"

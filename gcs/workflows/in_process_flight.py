@@ -33,14 +33,17 @@ def fly_in_process(
 ) -> Outcome:
     """Fly as `gcs fly` does in lockstep; the log gets the same bytes. GcsError if it cannot be flown.
 
-    `warn` is called with a line for each option that may be unintended and for what the vehicle lacks in the
-    wind, `log_sensors` with the bytes of a log of the sensors.
+    `warn` is called with a line for each option that may be unintended, if machine code cannot be kept, and
+    for what the vehicle lacks in the wind, `log_sensors` with the bytes of a log of the sensors.
     """
     check_law(mission, options)
     for line in (*check_options(options), *mission_warnings(options.planner, mission)):
         warn(line)
     of_the_vehicle = vehicle_parts(options.vehicle, map(parse_setting, options.settings))
-    warm_up([*in_process_parts((options.law,)), *of_the_vehicle], options.quiet)
+    notes: list[str] = []
+    warm_up([*in_process_parts((options.law,)), *of_the_vehicle], options.quiet, warn=notes.append)
+    for line in notes:
+        warn(line)
     check_mission(mission, options)
     for line in wind_warnings(mission, options):
         warn(line)

@@ -56,16 +56,25 @@ def upload(
 
 
 def checked_upload(
-    mission: str, vehicle: str, force: bool, skip: bool, print_line: PrintLine
+    mission: str,
+    vehicle: str,
+    force: bool,
+    skip: bool,
+    print_line: PrintLine,
+    note: PrintLine = notify,
+    quiet: bool = False,
 ) -> Callable[[Session], None]:
     """Read a mission by name or path, and check it for `vehicle`; return a function that uploads it in a
     session. A file of another ground station is checked only in that function, since its positions must be
-    judged by the vehicle's home."""
+    judged by the vehicle's home; `note` gets a line for each thing that is not flown as in the file. Unless
+    `quiet`, a check that takes long is said."""
     path = Path(mission)
     if is_foreign(path) and not is_mission_file(path):
         plan = read_foreign(path)
-        return lambda session: _upload_foreign(session, path, plan, vehicle, force, skip, print_line)
-    with notify_if_slow(CHECKING_TEXT):
+        return lambda session: _upload_foreign(
+            session, path, plan, vehicle, force, skip, print_line, note, quiet
+        )
+    with notify_if_slow(CHECKING_TEXT, quiet):
         loaded = load_checked(mission, vehicle, force)
 
     def send(session: Session) -> None:
@@ -77,14 +86,22 @@ def checked_upload(
 
 
 def _upload_foreign(
-    session: Session, path: Path, plan: Plan, vehicle: str, force: bool, skip: bool, print_line: PrintLine
+    session: Session,
+    path: Path,
+    plan: Plan,
+    vehicle: str,
+    force: bool,
+    skip: bool,
+    print_line: PrintLine,
+    note: PrintLine,
+    quiet: bool,
 ) -> None:
     mission = mission_of(plan, vehicle_home(session), path.stem)
     if plan.home is not None and (difference := home_difference(plan.home, mission.home)):
-        notify(f"{path}: {difference}")
-    items = _flyable_items(path, mission, skip)
+        note(f"{path}: {difference}")
+    items = _flyable_items(path, mission, skip, note)
     if not force:
-        with notify_if_slow(CHECKING_TEXT):
+        with notify_if_slow(CHECKING_TEXT, quiet):
             require_flyable(mission, vehicle)
     counted = _as_counted(items, mission.home, session)
     # the fence first: the vehicle checks the mission against it
@@ -117,11 +134,11 @@ def _as_counted(items: Sequence[WireItem], home: Home, session: Session) -> Sequ
     return [home_item(home), *redirected(items, lambda target: target + 1)]
 
 
-def _flyable_items(path: Path, mission: ForeignMission, skip: bool) -> tuple[WireItem, ...]:
-    """The items to upload. Prints what cannot be flown as in the file; GcsError if something must be left out
-    without `skip`, or if nothing remains."""
+def _flyable_items(path: Path, mission: ForeignMission, skip: bool, note: PrintLine) -> tuple[WireItem, ...]:
+    """The items to upload; `note` gets what cannot be flown as in the file. GcsError if something must be
+    left out without `skip`, or if nothing remains."""
     for line in (*mission.notes, *mission.left_out):
-        notify(f"{path}: {line}")
+        note(f"{path}: {line}")
     if mission.left_out and not skip:
         count = len(mission.left_out)
         raise GcsError(

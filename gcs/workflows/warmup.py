@@ -73,9 +73,15 @@ def all_sweep_parts(laws: Sequence[str]) -> list[Part]:
     return [*alone, *(lanes_part(law) for law in laws if law in LAWS)]
 
 
-def warm_up(parts: Iterable[Part], quiet: bool = False, stopped: Callable[[], bool] = lambda: False) -> None:
+def warm_up(
+    parts: Iterable[Part],
+    quiet: bool = False,
+    stopped: Callable[[], bool] = lambda: False,
+    warn: Callable[[str], None] = notify,
+) -> None:
     """Compile those of these parts that are not compiled yet, the longest first; if the machine code cannot
-    be kept, for this program alone, with a warning. StoppedError as soon as `stopped` returns True."""
+    be kept, for this program alone, and `warn` is called with a line that says so. StoppedError as soon as
+    `stopped` returns True."""
     waiting = sorted((part for part in parts if not part.ready), key=lambda part: -part.cost_s)
     if not waiting:
         return
@@ -84,7 +90,7 @@ def warm_up(parts: Iterable[Part], quiet: bool = False, stopped: Callable[[], bo
     busy = os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
     not_kept_reason = storage_problem()
     if not_kept_reason:
-        notify(
+        warn(
             f"{not_kept_reason}; the machine code cannot be kept there and is compiled for this run alone; "
             f"{KEEPING_HINT}"
         )

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
+import plumbline
 from autopilot.shell.compiling import Part
 from gcs.cli import gcs
 from gcs.errors import GcsError, StoppedError
@@ -174,6 +175,22 @@ def test_what_cannot_be_kept_is_compiled_once_into_a_folder_that_the_children_sh
     warm_up([*parts, part("later", "pass")], quiet=True)
     assert capsys.readouterr().err == ""
     assert len(seen.read_text().split()) == 2
+
+
+def refuse(*_):
+    raise GcsError("no flight is needed")
+
+
+def test_a_script_is_warned_that_machine_code_is_not_kept(unwritable, monkeypatch, capfd):
+    monkeypatch.setattr(
+        "gcs.workflows.in_process_flight.in_process_parts", lambda laws: [part("tick", "pass")]
+    )
+    monkeypatch.setattr("gcs.workflows.in_process_flight.check_mission", refuse)
+    not_kept = pytest.warns(UserWarning, match="Not a directory; the machine code cannot be kept there")
+    with not_kept as told, pytest.raises(plumbline.Error, match="no flight is needed"):
+        plumbline.fly("hover", sensors="ideal")
+    assert told[0].filename == __file__
+    assert capfd.readouterr() == ("", "")
 
 
 def test_without_any_folder_for_machine_code_nothing_is_compiled(unwritable, monkeypatch):

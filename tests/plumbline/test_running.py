@@ -7,7 +7,9 @@ import queue
 import threading
 from collections.abc import Callable
 from dataclasses import fields
+from functools import partial
 from math import nan
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,9 +21,11 @@ from autopilot.wire.convert.telemetry import attitude_values, local_position_ned
 from autopilot.wire.dialect import plumbline as mavlink
 from gcs.analysis.axes import roll_pitch_yaw
 from gcs.clients.datagrams import messages
-from gcs.clients.operation import Target
+from gcs.clients.missions import MissionUpload
+from gcs.clients.operation import Result, Status, Target
 from gcs.clients.vehicle_view import VehicleView
 from gcs.errors import RefusedError
+from gcs.shell import display
 from gcs.shell.link import UdpSocket, free_port
 from gcs.workflows.reposition import reposition
 from plumbline import RunningVehicle
@@ -427,6 +431,64 @@ def at_home_in_hold(at: Callable[[float], Any]) -> ReportingSession:
         in_hold(0.0, nan),
         at=at,
     )
+
+
+class TakingSession(ReportingSession):
+    """A vehicle at rest at home that takes every mission."""
+
+    def __init__(self) -> None:
+        super().__init__(
+            DISARMED,
+            mavlink.MAVLink_gps_global_origin_message(473977420, 85455940, 0),
+            mavlink.MAVLink_home_position_message(473977420, 85455940, 0, 0, 0, 0, LEVEL, 0, 0, 0),
+            at=lambda time_s: in_hold(time_s, nan),
+        )
+
+    def run(self, operation: Any, label: str = "") -> Any:
+        return (
+            Result(Status.DONE, "taken") if isinstance(operation, MissionUpload) else super().run(operation)
+        )
+
+
+class ImmediateTimer:
+    """A timer whose time is over at once."""
+
+    def __init__(self, _: float, function: Callable[..., None], arguments: tuple[Any, ...]) -> None:
+        self.daemon = False
+        self.start = partial(function, *arguments)
+
+    def cancel(self) -> None:
+        """It is too late."""
+
+
+WAYPOINTS = """QGC WPL 110
+0 1 0 16 0 0 0 0 47.397742 8.545594 0 1
+1 0 3 22 0 0 0 0 47.397742 8.545594 1 1
+2 0 3 203 0 0 0 0 0 0 0 1
+3 0 3 21 0 0 0 0 47.397742 8.545594 0 1
+"""
+
+
+@pytest.mark.parametrize("force", [False, True])
+def test_an_upload_prints_nothing_and_warns_of_what_is_not_as_in_the_file(
+    force: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(display, "Timer", ImmediateTimer)
+    file = tmp_path / "other.waypoints"
+    file.write_text(WAYPOINTS.replace(" ", "\t").replace("QGC\tWPL\t", "QGC WPL "), encoding="utf-8")
+    with RunningVehicle(TakingSession(), 1.0) as vehicle:  # type: ignore[arg-type]
+        vehicle.upload("hover", force=force)
+        with pytest.warns(UserWarning, match=r"other\.waypoints: ") as told:
+            vehicle.upload(file, force=force)
+        file.write_text(file.read_text().replace("47.397742", "47.5", 1), encoding="utf-8")
+        not_flown = pytest.raises(plumbline.Error, match=r"other\.waypoints: 1 thing is not flown$")
+        with pytest.warns(UserWarning) as left_out, not_flown:
+            vehicle.upload(file, force=force)
+        assert any(
+            "the home row, but the vehicle's home is elsewhere" in str(one.message) for one in left_out
+        )
+    assert {one.filename for one in told} == {__file__}
+    assert capfd.readouterr() == ("", "")
 
 
 def test_a_load_that_is_held_away_from_its_goal_ends_goto() -> None:

@@ -116,6 +116,18 @@ def test_a_vehicle_with_another_id_is_no_twin(
     assert not ground.twin_problem
 
 
+def test_a_script_is_told_of_other_vehicles_by_its_own_means(
+    address: Address, two: tuple[UdpSocket, UdpSocket], capsys: pytest.CaptureFixture[str]
+) -> None:
+    told: list[str] = []
+    with Session(address, note=told.append, quiet=True) as session:
+        for sender, datagram in ((two[0], heartbeat()), (two[1], heartbeat()), (two[0], telemetry())):
+            sender.send(datagram)
+        assert session.watch(lambda: bool(told), WAIT_S)
+    assert f"from {two[1].address} and is not heard" in told[0]
+    assert not capsys.readouterr().err
+
+
 def test_what_moves_one_of_two_twins_is_refused(address: Address, two: tuple[UdpSocket, UdpSocket]) -> None:
     with Session(address) as session:
         for one in two:
