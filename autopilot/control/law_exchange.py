@@ -10,13 +10,14 @@ World ENU, body FLU, SI.
 
 from __future__ import annotations
 
-from math import isfinite, nan
+from math import nan
 from typing import NamedTuple
 
 from autopilot.control.records import Cable, Reference, State
 from autopilot.geometry.addresses import call_at, numbers_at
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import IDENTITY, Mat3, Vec3
+from autopilot.geometry.magnitude import is_bounded, is_bounded_vector
 from autopilot.geometry.packed import pack, unpack, width
 from autopilot.geometry.so3 import is_rotation
 
@@ -90,12 +91,13 @@ LAW_OFFSET = COMMAND_OFFSET + width(Asked)  # from here on the row belongs to th
 
 @kernel
 def is_valid(command: Asked) -> bool:
-    """Whether the kind is a known one, all numbers are finite, and a commanded attitude is a rotation."""
-    v, R = command.vector, command.attitude
-    rows = R[0][0] + R[0][1] + R[0][2] + R[1][0] + R[1][1] + R[1][2] + R[2][0] + R[2][1] + R[2][2]
-    if not (WRENCH <= command.kind <= RATES and isfinite(command.thrust + v[0] + v[1] + v[2] + rows)):
+    """Whether the kind is a known one, no number is too large or none, and a commanded attitude is a
+    rotation."""
+    if not (WRENCH <= command.kind <= RATES):
         return False
-    return command.kind != ATTITUDE or is_rotation(R)
+    if not (is_bounded(command.thrust) and is_bounded_vector(command.vector)):
+        return False
+    return command.kind != ATTITUDE or is_rotation(command.attitude)
 
 
 @kernel

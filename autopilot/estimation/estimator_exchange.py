@@ -32,6 +32,12 @@ from autopilot.estimation.inbox import (
 from autopilot.estimation.records import Array, EstimatorTuning, ImuReading
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import IDENTITY, ZERO, Mat3, Vec3, dot, norm
+from autopilot.geometry.magnitude import (
+    BOUNDED_TEXT,
+    MAX_MAGNITUDE_TEXT,
+    is_bounded,
+    is_bounded_vector,
+)
 from autopilot.geometry.packed import unpack, width, with_field
 from autopilot.geometry.so3 import is_rotation, rotation_from_quat
 from autopilot.vehicle.layout import MAX_ROTORS
@@ -247,29 +253,27 @@ def with_readings(sensed: Sensed, inbox: Array, count: int, now_us: int, tuning:
 
 
 # what is wrong with an estimate
-VALID, NOT_A_NUMBER, NOT_A_ROTATION, NOT_A_UNIT_VECTOR, NOT_A_DEVIATION, LOST = range(6)
-
-
-@kernel
-def _is_number(v: Vec3) -> bool:
-    return isfinite(v[0] + v[1] + v[2])
+VALID, NOT_BOUNDED, NOT_A_ROTATION, NOT_A_UNIT_VECTOR, NOT_A_DEVIATION, LOST = range(6)
 
 
 @kernel
 def _is_deviation(std: float) -> bool:
     """Whether this is a standard deviation, or not given."""
-    return isnan(std) or (std >= 0.0 and isfinite(std))
+    return isnan(std) or (std >= 0.0 and is_bounded(std))
 
 
 @kernel
 def estimate_fault(estimate: Estimate) -> int:
     """What is wrong with a known estimate: VALID if nothing is."""
     s = estimate.state
-    numbers = _is_number(s.x_load) and _is_number(s.v_load) and _is_number(s.x_quad) and _is_number(s.v_quad)
-    numbers = numbers and _is_number(s.omega_body) and _is_number(s.q_cable_dot) and _is_number(s.q_cable)
+    places = is_bounded_vector(s.x_load) and is_bounded_vector(s.x_quad) and is_bounded_vector(s.q_cable)
+    motions = is_bounded_vector(s.v_load) and is_bounded_vector(s.v_quad)
+    rates = is_bounded_vector(s.omega_body) and is_bounded_vector(s.q_cable_dot)
     a_quad_given = not (isnan(s.a_quad[0]) and isnan(s.a_quad[1]) and isnan(s.a_quad[2]))
-    if not numbers or (a_quad_given and not _is_number(s.a_quad)):
-        return NOT_A_NUMBER
+    if not (places and motions and rates) or (a_quad_given and not is_bounded_vector(s.a_quad)):
+        return NOT_BOUNDED
+    if not (isnan(estimate.tension) or is_bounded(estimate.tension)):
+        return NOT_BOUNDED
     if not abs(dot(s.q_cable, s.q_cable) - 1.0) < UNIT_TOLERANCE:
         return NOT_A_UNIT_VECTOR
     if not (_is_deviation(estimate.horizontal_std) and _is_deviation(estimate.vertical_std)):
@@ -288,12 +292,13 @@ def fault_text(estimate: Estimate, fault: int) -> str:
         return f"gives R = {_formatted(state.R)}, which is no rotation"
     if fault == NOT_A_DEVIATION:
         wrong = "vertical_std" if _is_deviation(estimate.horizontal_std) else "horizontal_std"
-        return f"gives {wrong} = {getattr(estimate, wrong):.4g}; must be 0 or more, and left out if not known"
+        limits = f"must be 0 ... {MAX_MAGNITUDE_TEXT}, and left out if not known"
+        return f"gives {wrong} = {getattr(estimate, wrong):.4g}; {limits}"
     for name in ("x_load", "v_load", "q_cable", "q_cable_dot", "x_quad", "v_quad", "omega_body", "a_quad"):
         vector = getattr(state, name)
-        if not _is_number(vector):
-            return f"gives {name} = {_formatted(vector)}"
-    return "returns a value that is not a number"
+        if not is_bounded_vector(vector):
+            return f"gives {name} = {_formatted(vector)}; {BOUNDED_TEXT}"
+    return f"gives tension = {_formatted(estimate.tension)}; {BOUNDED_TEXT}"
 
 
 def _formatted(value: Any) -> str:

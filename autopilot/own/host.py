@@ -1,8 +1,8 @@
 """Flies a custom control law: calls its methods, and finds what is wrong with them.
 
-A law that raises, or commands something that is no number, is not called again: its functions are unlinked,
-so that the built-in law flies from the same tick on, and `fault` says why. The supervisor sees that at the
-next tick.
+A law that raises, or commands something that is no number or far too large, is not called again: its
+functions are unlinked, so that the built-in law flies from the same tick on, and `fault` says why. The
+supervisor sees that at the next tick.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ from autopilot.control.law_exchange import (
     is_valid,
 )
 from autopilot.control.laws import link_own
+from autopilot.geometry.magnitude import BOUNDED_TEXT, is_bounded, is_bounded_vector
 from autopilot.geometry.packed import Row, pack, unpack
 from autopilot.own.compiled import ExchangeLayout, compiled, function_address, is_compiled, memory_type
 from autopilot.own.guard import CallError, Guard, MethodCaller, memory_and_answer, short_repr
@@ -164,10 +165,10 @@ def _invalid_command_text(command: Asked) -> str:
     """What is invalid in a command, in words."""
     if not WRENCH <= command.kind <= RATES:
         return f"asks for a kind {command.kind} that there is not"
-    if not isfinite(command.thrust):
-        return f"asks for a thrust of {command.thrust} N"
-    if not all(map(isfinite, command.vector)):
-        return f"asks for {command.vector}"
+    if not is_bounded(command.thrust):
+        return f"asks for a thrust of {command.thrust} N; {BOUNDED_TEXT}"
+    if not is_bounded_vector(command.vector):
+        return f"asks for {command.vector}; {BOUNDED_TEXT}"
     if not all(isfinite(number) for row in command.attitude for number in row):
         return "commands an attitude that is not a number"
     return (

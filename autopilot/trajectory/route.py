@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from autopilot.geometry.linear import Vec3
+from autopilot.geometry.magnitude import BOUNDED_TEXT, is_bounded
 from autopilot.trajectory.convex import excess
 from autopilot.trajectory.peaks import Body
 from autopilot.trajectory.rotor_demand import COS_TILT, TENSION, TURN, Bounds, demand, rotor_commands
@@ -109,8 +110,8 @@ def use(path: Path, route: Route) -> float:
 
 
 def check_path(path: Path, route: Route) -> None:
-    """Raise PlanError if the path is not valid for the route: values that are no numbers, wrong times, jumps,
-    a missed waypoint, or a place below the ground."""
+    """Raise PlanError if the path is not valid for the route: values that are no numbers, wrong times, places
+    too far away, jumps, a missed waypoint, or a place below the ground."""
     table, passes = path.table, path.passes_s
     if len(passes) != len(route.points):
         raise PlanError(f"passes_s are {len(passes)} times; must be {len(route.points)}, one for each point")
@@ -133,6 +134,10 @@ def check_path(path: Path, route: Route) -> None:
             f"the path ends at {last_s:g} s and passes its last point at {passes[-1]:g} s; must be the same, "
             f"and at most {MAX_DURATION_S:g} s"
         )
+    places = _sample_finely(path)[1][0]
+    farthest_m = float(np.abs(places).max())
+    if not is_bounded(farthest_m):
+        raise PlanError(f"the path leads to {farthest_m:.3g} m; {BOUNDED_TEXT}")
     _check_joints(table)
     passed = sample_path(table, np.array(passes))[0]
     for i, (passed_point, point) in enumerate(zip(passed, route.points, strict=True)):
@@ -141,7 +146,7 @@ def check_path(path: Path, route: Route) -> None:
             raise PlanError(
                 f"the path passes point {i} {off_m:.2f} m beside it; must be {POINT_TOLERANCE_M:g} m at most"
             )
-    lowest = float(_sample_finely(path)[1][0, :, 2].min())
+    lowest = float(places[:, 2].min())
     if lowest <= 0.0:
         raise PlanError(f"the path leads to {lowest:.2f} m above home; must be above the ground")
 

@@ -117,9 +117,10 @@ def test_one_that_fails_is_replaced_at_once_and_the_vehicle_lands(kind: type) ->
     flown.run(lambda one: any("failed" in text for text in one.texts))
     told = "".join(flown.texts[-3:])
     line = kind.estimate.__code__.co_firstlineno  # type: ignore[attr-defined]
+    file = Path(__file__).name
     why = {
-        FailsInHold: f"RuntimeError: no idea ({Path(__file__).name}:{line + 2})",
-        NoNumberInHold: f"gives v_load = (0, nan, 0) ({Path(__file__).name}:{line})",
+        FailsInHold: f"RuntimeError: no idea ({file}:{line + 2})",
+        NoNumberInHold: f"gives v_load = (0, nan, 0); must be numbers up to 1e9 ({file}:{line})",
     }[kind]
     assert f"Estimator {kind.__name__} failed: {why}; landing by the built-in filter" in told
     assert flown.flight.phase == Phase.LOWER

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from autopilot.geometry.linear import IDENTITY
+from autopilot.geometry.magnitude import MAX_MAGNITUDE
 from autopilot.own.own_code import OwnCode
 from autopilot.supervisor.state import Phase
 from autopilot.wire.convert.geodesy import Home
@@ -97,6 +99,31 @@ class FailsInHold(LoadPid):
         return super().load_position(memory, now)
 
 
+class CommandsTooMuch(LoadPid):
+    """Commands an unearthly force two seconds after lift-off."""
+
+    def load_position(self, memory: Any, now: Now) -> tuple[Any, Asked]:
+        if now.time_s > 10.0:
+            return memory, force((1e160, 0.0, 0.0))
+        return super().load_position(memory, now)
+
+
+class AtTheLimits(LoadPid):
+    """Commands as much as a law may, of each kind at one tick after the other."""
+
+    def load_position(self, memory: Any, now: Now) -> tuple[Any, Asked]:
+        if now.time_s < 10.0:
+            return super().load_position(memory, now)
+        most = MAX_MAGNITUDE
+        commands = (
+            force((most, -most, most)),
+            attitude(IDENTITY, most),
+            rates(most, (-most, most, most)),
+            wrench(most, (most, most, -most)),
+        )
+        return memory, commands[round(now.time_s / now.period_s) % len(commands)]
+
+
 class FailsAtTouchdown(LoadPid):
     """Fails when the vehicle lands beside the load."""
 
@@ -163,6 +190,27 @@ def test_one_that_fails_is_replaced_at_once_and_the_vehicle_lands() -> None:
     assert flown.texts[-1] == "Landed, disarmed"
     assert flown.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0) != ACCEPTED
     assert any(text.startswith("Arming denied: Law FailsInHold failed: RuntimeErro") for text in flown.texts)
+
+
+def test_one_that_commands_more_than_any_vehicle_has_is_named_and_replaced() -> None:
+    flown = craft(CommandsTooMuch, Takeoff(1.0), Delay(30.0), Land())
+    flown.begin()
+    flown.run(lambda one: any("failed" in text for text in one.texts))
+    flown.wait(1.0)
+    told = "Law CommandsTooMuch failed: asks for (1e+160, 0.0, 0.0); must be numbers up to 1e9 (tes"
+    assert told in "".join(flown.texts)
+    assert flown.flight.phase == Phase.LOWER
+    assert flown.worst_error < SWING
+
+
+def test_from_the_largest_numbers_that_a_law_may_command_follow_numbers() -> None:
+    flown = craft(AtTheLimits, Takeoff(1.0), Delay(30.0), Land())
+    flown.begin()
+    core = flown.onboard.core
+    flown.run(lambda _: core.control.command.thrust == MAX_MAGNITUDE)
+    flown.wait(0.1)
+    assert not any("failed" in text for text in flown.texts)
+    assert np.isfinite(core.rows.control).all()
 
 
 def test_one_that_fails_at_touchdown_lands() -> None:

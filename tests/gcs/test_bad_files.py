@@ -109,7 +109,7 @@ BAD = {
         (law("1 / 0"), "Law Mine failed: ZeroDivisionError: division by zero (mine.py:8)"),
         (
             law("return memory, wrench(nan, (0, 0, 0))"),
-            "Mine failed: asks for a thrust of nan N (mine.py:7)",
+            "Mine failed: asks for a thrust of nan N; must be numbers up to 1e9 (mine.py:7)",
         ),
         (law("return memory, force((0, 0))"), "the force has 2 numbers; must be 3 (mine.py:8)"),
         (law("return force((0, 0, 4.9))"), "load_position returned Asked(kind="),
@@ -121,7 +121,23 @@ BAD = {
         (estimator("1 / 0"), "Estimator Mine failed: ZeroDivisionError: division by zero (mine.py:10)"),
         (
             estimator("return memory, estimated(*s._replace(v_load=(nan, 0, 0)))"),
-            "Estimator Mine failed: gives v_load = (nan, 0, 0) (mine.py:8)",
+            "Estimator Mine failed: gives v_load = (nan, 0, 0); must be numbers up to 1e9 (mine.py:8)",
+        ),
+        (
+            estimator("return memory, estimated(*s._replace(q_cable_dot=(0, 1e160, 0)))"),
+            "Mine failed: gives q_cable_dot = (0, 1e+160, 0); must be numbers up to 1e9 (mine.py:8)",
+        ),
+        (
+            estimator("return memory, estimated(*s._replace(a_quad=(1e160, 0, 0)))"),
+            "Estimator Mine failed: gives a_quad = (1e+160, 0, 0); must be numbers up to 1e9 (mine.py:8)",
+        ),
+        (
+            estimator("return memory, estimated(*s, tension=float('inf'))"),
+            "Estimator Mine failed: gives tension = inf; must be numbers up to 1e9 (mine.py:8)",
+        ),
+        (
+            estimator("return memory, estimated(*s, horizontal_std=1e160)"),
+            "gives horizontal_std = 1e+160; must be 0 ... 1e9, and left out if not known (mine.py:8)",
         ),
         (
             estimator("return memory, estimated(*s._replace(q_cable=(0, 0, -2)))"),
@@ -133,18 +149,18 @@ BAD = {
         ),
         (
             estimator("return memory, estimated(*s, horizontal_std=-1)"),
-            "gives horizontal_std = -1; must be 0 or more, and left out if not known (mine.py:8)",
+            "gives horizontal_std = -1; must be 0 ... 1e9, and left out if not known (mine.py:8)",
         ),
         (
             COMPILED.format(
                 body="s = now.built_in; return memory, estimated(s.x_load, s.v_load, s.q_cable, "
                 "s.q_cable_dot, s.x_quad, s.v_quad, s.R, s.omega_body, s.a_quad, vertical_std=-0.2)"
             ),
-            "gives vertical_std = -0.2; must be 0 or more, and left out if not known (mine.py:",
+            "gives vertical_std = -0.2; must be 0 ... 1e9, and left out if not known (mine.py:",
         ),
         (
             estimator("return memory, estimated(*s, vertical_std=float('inf'))"),
-            "gives vertical_std = inf; must be 0 or more, and left out if not known (mine.py:8)",
+            "gives vertical_std = inf; must be 0 ... 1e9, and left out if not known (mine.py:8)",
         ),
         (
             estimator("return memory, estimated(*s._replace(x_quad=(0, 0)))"),
@@ -179,6 +195,10 @@ BAD = {
         (
             planner("return polynomials([0, 3], [[(nan, 0, 0)]], [0, 3])"),
             "the path contains a value that is not a number",
+        ),
+        (
+            planner("return samples([0, 2, 4], [ends[0], (1e160, 0, 1), ends[1]], [0, 4])"),
+            "the path leads to 1e+160 m; must be numbers up to 1e9 (mine.py:7)",
         ),
         (
             planner("return samples([0, 3], [ends[0], ends[0]], [0, 3])"),

@@ -14,6 +14,7 @@ import numba
 import pytest
 
 from autopilot.control.law_exchange import Asked, Now
+from autopilot.geometry.linear import IDENTITY
 from autopilot.own.calls import USER_CALL
 from autopilot.own.compiled import is_compiled, kernel
 from autopilot.own.estimator import estimator_from_class
@@ -72,6 +73,30 @@ WRONG: dict[str, tuple[Callable[[Any, Now], Any], str]] = {
     ),
     "thrust": (lambda memory, now: (memory, wrench(nan, (0.0, 0.0, 0.0))), "asks for a thrust of nan N"),
     "moment": (lambda memory, now: (memory, wrench(1.0, (0.0, inf, 0.0))), r"asks for \(0\.0, inf, 0\.0\)"),
+    "huge thrust": (
+        lambda memory, now: (memory, wrench(1e160, (0.0, 0.0, 0.0))),
+        r"asks for a thrust of 1e\+160 N; must be numbers up to 1e9 \(test_host\.py:\d+\)",
+    ),
+    "huge thrust of an attitude": (
+        lambda memory, now: (memory, attitude(IDENTITY, -1e160)),
+        r"asks for a thrust of -1e\+160 N; must be numbers up to 1e9",
+    ),
+    "huge moment": (
+        lambda memory, now: (memory, wrench(1.0, (0.0, 1e160, 0.0))),
+        r"asks for \(0\.0, 1e\+160, 0\.0\); must be numbers up to 1e9",
+    ),
+    "huge force": (
+        lambda memory, now: (memory, force((1e160, 0.0, 0.0))),
+        r"asks for \(1e\+160, 0\.0, 0\.0\); must be numbers up to 1e9",
+    ),
+    "huge rate": (
+        lambda memory, now: (memory, rates(1.0, (0.0, 0.0, -1e160))),
+        r"asks for \(0\.0, 0\.0, -1e\+160\); must be numbers up to 1e9",
+    ),
+    "huge attitude": (
+        lambda memory, now: (memory, attitude(((1e160, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), 1.0)),
+        "commands an attitude that is no rotation",
+    ),
     "shape": (
         lambda memory, now: (memory, wrench(1.0, (1.0, 2.0))),
         r"ValueError: the moment has 2 numbers; must be 3 \(test_host\.py:\d+\)",
@@ -344,7 +369,10 @@ def test_a_compiled_law_answers_as_python_would() -> None:
 
 
 def test_a_compiled_law_that_asks_for_nothing_is_told() -> None:
-    with pytest.raises(OwnError, match=r"Law Compiled failed: asks for a thrust of nan N \(test_host\.py"):
+    with pytest.raises(
+        OwnError,
+        match=r"Law Compiled failed: asks for a thrust of nan N; must be numbers up to 1e9 \(test_host\.py",
+    ):
         tried(Compiled)
 
 
