@@ -31,10 +31,11 @@ from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Vec3, add, norm, scale, sub, times
 
 MAX_LEAN_TANGENT = 1.0  # tan 45 deg
-# least and greatest upward force, in weights
+# least and greatest upward force, in weights. The greatest is also enough to carry the load, because a cable
+# may count as taut only when it pulls with most of the load's weight
 _MIN_LIFT = 0.2
 _MAX_LIFT = 1.6
-# the same: a vehicle that should lift less leans no more than one that lifts this. One that stands in the
+# in weights: a vehicle that should lift less leans no more than one that lifts this. One that stands in the
 # wind would otherwise lean the more the less it lifts, until the wind turns it over
 _LEANING_LIFT = 0.8
 
@@ -73,9 +74,10 @@ def leaning_lift(up: float, weight: float) -> float:
 
 
 @kernel
-def limited_force(F: Vec3, weight: float) -> Vec3:
-    """F with an upward part of 0.2 to 1.6 weights, for which the vehicle leans no more than 45 deg."""
-    up = min(_MAX_LIFT * weight, max(_MIN_LIFT * weight, F[2]))
+def limited_force(F: Vec3, weight: float, carrying_lift: float) -> Vec3:
+    """F with an upward part of 0.2 to 1.6 weights, or to `carrying_lift` (N) if that is more, for which the
+    vehicle leans no more than 45 deg."""
+    up = min(max(_MAX_LIFT * weight, carrying_lift), max(_MIN_LIFT * weight, F[2]))
     sideways = norm((F[0], F[1], 0.0))
     shrink = min(1.0, MAX_LEAN_TANGENT * leaning_lift(up, weight) / max(sideways, 1e-9))
     return (shrink * F[0], shrink * F[1], up)
@@ -105,7 +107,8 @@ def quad_position(
         state.x_quad, state.v_quad, x_d, v_d, a_d, position_gains, mass, vehicle.gravity
     )
     weight = mass * vehicle.gravity
-    F = limited_force(sub(unlimited, push), weight)
+    carrying_lift = (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity
+    F = limited_force(sub(unlimited, push), weight, carrying_lift)
     R_c = attitude_towards((F[0], F[1], leaning_lift(F[2], weight)), reference.b1_d, state.R)
     memory, command = quad_attitude(memory, state, R_c, thrust_along(F, state.R), gains, filters, vehicle)
     zero: Vec3 = (0.0, 0.0, 0.0)

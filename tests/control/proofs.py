@@ -297,17 +297,18 @@ def vehicle_error_obeys_its_law(laws: SimpleNamespace, model: SimpleNamespace, v
         F = laws.position_force(*(model.vec(p) for p in (x, v, x_d, v_d, a_d)), gains, 0.4, 9.81)
         wanted = 0.4 * (a_d + 9.81 * E3) - np.array(gains.k_x) * (x - x_d) - np.array(gains.k_v) * (v - v_d)
         close(F, wanted, EXACT)
-    close(laws.limited_force((0.1, -0.2, 4.0), 3.924), (0.1, -0.2, 4.0), EXACT)
+    close(laws.limited_force((0.1, -0.2, 4.0), 3.924, 4.905), (0.1, -0.2, 4.0), EXACT)
     # it leans for no less than 0.8 weights, by 45 deg at most
     up, leaning, tangent = 0.2 * 3.924, 0.8 * 3.924, 1.0
     close(
-        laws.limited_force((3.0, -4.0, -9.0), 3.924),
+        laws.limited_force((3.0, -4.0, -9.0), 3.924, 4.905),
         (0.6 * tangent * leaning, -0.8 * tangent * leaning, up),
         EXACT,
     )
     close(laws.leaning_lift(up, 3.924), leaning, EXACT)
     close(laws.leaning_lift(4.5, 3.924), 4.5, EXACT)
-    close(laws.limited_force((0.0, 0.0, 99.0), 3.924), (0.0, 0.0, 1.6 * 3.924), EXACT)
+    close(laws.limited_force((0.0, 0.0, 99.0), 3.924, 4.905), (0.0, 0.0, 1.6 * 3.924), EXACT)
+    close(laws.limited_force((0.0, 0.0, 99.0), 3.924, 9.81), (0.0, 0.0, 9.81), EXACT)
 
 
 def lift_of_the_attitude_modes(laws: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
@@ -427,6 +428,14 @@ def errors_reach_the_command(laws: SimpleNamespace, model: SimpleNamespace, vehi
         memory, state, reference, 0.0, (0.0, 0.0, 0.3), laws.QUAD_POSITION_GAINS, gains, filters, vehicle
     )[1]
     close(pushed.thrust, command.thrust - 0.3, EXACT)
+    # of a vehicle that should be far higher: enough to carry a load three times as heavy
+    laden = vehicle._replace(load_mass=3.0 * vehicle.quad_mass)
+    above = (state.x_quad[0], state.x_quad[1], state.x_quad[2] + 9.0)
+    reference = Reference((above, zero, zero, zero, zero, zero, zero), (1.0, 0.0, 0.0))
+    lifting = laws.quad_position(
+        memory, state, reference, 0.0, zero, laws.QUAD_POSITION_GAINS, gains, filters, laden
+    )[1]
+    close(lifting.thrust, 4.0 * vehicle.quad_mass * vehicle.gravity, EXACT)
 
 
 PROOFS: tuple[Any, ...] = (
