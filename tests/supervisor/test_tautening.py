@@ -20,7 +20,7 @@ from tests.doubles.sky import ACCEPTED, SETTINGS, STEP_US, Sky, entered, view
 LIMIT_M = SETTINGS.failsafe.load_error_limit_m
 OUTWARD = (1.0, 0.0, 0.0)  # m/s
 DRIFTS_AWAY = "Failsafe: drifts away while tautening the cable, "
-CAUSES = ", landing; wind too strong, or the vehicle differs from its file"
+CAUSES = ", landing; wind too strong, rotors too slow, or the vehicle differs from its file"
 
 
 def tautening(legs: int) -> Flight:
@@ -117,6 +117,22 @@ def test_wind_is_named_where_the_vehicle_leans_against_it(tilt_deg: float) -> No
     if tilt_deg > 20.0:
         causes = f"too much wind (0.0 m off its path, tilted by 41 deg)? Else {causes}"
     assert sky.texts[-1] == f"Cable never taut, landing; {causes}"
+
+
+def test_no_wind_is_blamed_where_a_level_vehicle_does_not_rise() -> None:
+    sky = taking_off()
+    ideal = sky.obey
+
+    def held_down() -> View:
+        seen = ideal()
+        height = min(seen.x_quad[2], 0.8 * SETTINGS.cable_length_m)
+        return seen._replace(x_quad=(*seen.x_quad[:2], height), taut=False, pull_n=0.0)
+
+    sky.obey = held_down  # type: ignore[method-assign]
+    lead_m = 4.0
+    sky.settings = replace(SETTINGS, motion=replace(SETTINGS.motion, weight_lead_m=lead_m))
+    sky.run(lambda s: s.flight.phase == Phase.SET_DOWN)
+    assert sky.texts[-1] == "Cable never taut, landing; check VEH_CABLE_LEN, VEH_LOAD_MASS and VEH_QUAD_MASS"
 
 
 @pytest.mark.parametrize(("beside", "moves_aside"), [(0.4, True), (0.8, False)])

@@ -24,7 +24,6 @@ from autopilot.supervisor.state import (
 )
 from autopilot.supervisor.watches.cable_pull import PULL_US, TAUT_PULL_SHARE, cable_pull_share
 from autopilot.supervisor.watches.failsafe import PathError, off_path_text, path_error
-from autopilot.supervisor.watches.lag import RESUME_SHARE
 from autopilot.supervisor.watches.watch_result import WatchResult
 from autopilot.trajectory.slack_cable import creep_up_share
 from autopilot.wire.dialect.plumbline import MAV_SEVERITY_ERROR
@@ -95,10 +94,10 @@ def _never_taut(flight: Flight, view: View, error: PathError, settings: Settings
     """Land, as the cable did not come taut, or pulls although it is too short to count as taut."""
     if _pulls_although_short(view, settings):
         length = norm(sub(view.x_quad, view.x_load))
-        causes = _causes(error, view, settings, "VEH_CABLE_LEN")
+        causes = _causes(error, view, "VEH_CABLE_LEN")
         text = f"Cable pulls at {length:.2f} m, landing; {causes}"
     else:
-        causes = _causes(error, view, settings, "VEH_CABLE_LEN, VEH_LOAD_MASS and VEH_QUAD_MASS")
+        causes = _causes(error, view, "VEH_CABLE_LEN, VEH_LOAD_MASS and VEH_QUAD_MASS")
         text = f"Cable never taut, landing; {causes}"
     return WatchResult(interrupt_mission(flight), Event.LAND, ((CRITICAL, text),))
 
@@ -106,16 +105,16 @@ def _never_taut(flight: Flight, view: View, error: PathError, settings: Settings
 def _drifts_away(flight: Flight, how_far: str) -> WatchResult:
     """Land. The wind is not measured: it cannot be told from a vehicle that flies unlike the assumed one."""
     text = (
-        f"Failsafe: drifts away while tautening the cable, {how_far}, landing; wind too strong, or the "
-        "vehicle differs from its file"
+        f"Failsafe: drifts away while tautening the cable, {how_far}, landing; wind too strong, rotors "
+        "too slow, or the vehicle differs from its file"
     )
     return WatchResult(interrupt_mission(flight), Event.LAND, ((MAV_SEVERITY_ERROR, text),))
 
 
-def _causes(error: PathError, view: View, settings: Settings, parameters: str) -> str:
-    """What may be wrong when the cable does not come taut: these parameters, or strong wind."""
-    near = error.distance_m <= RESUME_SHARE * settings.failsafe.load_error_limit_m
-    if near and view.tilt_rad <= WINDY_TILT_RAD:
+def _causes(error: PathError, view: View, parameters: str) -> str:
+    """What may be wrong when the cable does not come taut: these parameters, or strong wind. A level vehicle
+    that is far off its path is held down by its load."""
+    if view.tilt_rad <= WINDY_TILT_RAD:
         return f"check {parameters}"
     found = f"{error.distance_m:.1f} m off its path, tilted by {degrees(view.tilt_rad):.0f} deg"
     return f"too much wind ({found})? Else check {parameters}"
