@@ -46,6 +46,14 @@ class Speed:
 
 @names_its_arguments
 @dataclass(frozen=True, slots=True)
+class SwitchFence:
+    """Put the vehicle's fence in force or out of force, also beyond the mission."""
+
+    on: bool
+
+
+@names_its_arguments
+@dataclass(frozen=True, slots=True)
 class Delay:
     """Hold the load where it hangs."""
 
@@ -220,13 +228,14 @@ class LookAt:
 
 HeadingCommand = TurnHeading | LookAt  # items between steps, which take effect as the next step begins
 LoadPath = Signals | Trajectory  # steps that give the load's place as a function of time
-MotionStep = Takeoff | Waypoint | Speed | Delay | ReturnHome | Land
+MotionStep = Takeoff | Waypoint | Speed | SwitchFence | Delay | ReturnHome | Land
 PayloadStep = Release | PlaceLoad | Winch
 Step = MotionStep | PayloadStep | LoadPath | AttitudeRun
 KINDS: dict[type[Step], str] = {  # their names in files
     Takeoff: "takeoff",
     Waypoint: "waypoint",
     Speed: "speed",
+    SwitchFence: "fence",
     Delay: "delay",
     Signals: "signals",
     Trajectory: "trajectory",

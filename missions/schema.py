@@ -68,6 +68,13 @@ class SpeedItem(Item):
         return model.Speed(self.speed_m_s)
 
 
+class FenceItem(Item):
+    on: bool = Field(description="whether the vehicle's fence is in force from here on")
+
+    def step(self) -> model.Step:
+        return model.SwitchFence(self.on)
+
+
 class DelayItem(Item):
     duration_s: RunSeconds = Field(description="time to hold the load where it hangs")
 
@@ -222,6 +229,7 @@ ITEMS: dict[str, type[Item]] = {
     "takeoff": TakeoffItem,
     "waypoint": WaypointItem,
     "speed": SpeedItem,
+    "fence": FenceItem,
     "delay": DelayItem,
     "signals": SignalsItem,
     "trajectory": TrajectoryItem,

@@ -51,6 +51,7 @@ from missions.model import (
     ReturnHome,
     Speed,
     Step,
+    SwitchFence,
     Takeoff,
     Waypoint,
     Winch,
@@ -111,6 +112,8 @@ def start_step(flight: Flight, event: Event, view: View, settings: Settings) -> 
     step = flight.mission.plan.steps[flight.mission.step]
     if isinstance(step, Speed):
         flight = with_speed(flight, step, settings)
+    if isinstance(step, SwitchFence):
+        flight = replace(flight, area=flight.area.with_fence_switched(step.on))
     if is_lowering_step(flight):
         return transition(flight, event, view, settings)
     if isinstance(step, Winch) and flight.cable.reel_target_m is None:

@@ -244,6 +244,10 @@ class Area:
             area = area.with_items(kind, items, home)
         return area
 
+    def with_fence_switched(self, on: bool) -> Area:
+        """The same with the fence in force or not; a previous breach is forgotten."""
+        return replace(self, fence_enabled=on, breach="")
+
     def with_items(self, kind: int, items: Sequence[WireItem], home: Home) -> Area:
         """The same with another fence or other rally points."""
         if kind == mavlink.MAV_MISSION_TYPE_FENCE:

@@ -33,6 +33,7 @@ from missions.model import (
     Signals,
     Speed,
     Step,
+    SwitchFence,
     Takeoff,
     Trajectory,
     Waypoint,
@@ -81,7 +82,7 @@ def step_legs(step: Step, here: Vec3, flight: Flight, settings: Settings) -> tup
         ):
             mode = QUAD_ATTITUDE if controlled == "vehicle" else LOAD_ATTITUDE
             return (Swing(here, north, east, duration, mode),)
-        case Speed():
+        case Speed() | SwitchFence():
             return (Hold(here, 0.0),)
         case Release():
             return (Hold(here, RELEASE_S),)

@@ -29,6 +29,7 @@ from missions.model import (
     Signals,
     Speed,
     Step,
+    SwitchFence,
     Takeoff,
     Trajectory,
     Waypoint,
@@ -99,6 +100,7 @@ class MissionState:
     unknown_after: str = ""
     cable_m: float | None = None  # None: not given
     released: bool = False
+    fence_on: bool = True  # the fence is not switched off
     speed_m_s: float = SPEED_M_S  # peak speed of transfers
     usual_speed_m_s: float = SPEED_M_S  # the same where the mission sets none
 
@@ -186,6 +188,8 @@ def state_after(step: Step, before: MissionState, home: Vec3 = ZERO) -> MissionS
             return before if here is None else replace(before, expected=there, unknown_after=unknown_after)
         case Speed(speed_m_s=speed):
             return replace(before, speed_m_s=before.usual_speed_m_s if speed is None else speed)
+        case SwitchFence(on=fence_on):
+            return replace(before, fence_on=fence_on)
         case Winch(length_m=length_change):
             cable = None if before.cable_m is None else before.cable_m + length_change
             return replace(before, expected=there, cable_m=cable)

@@ -21,6 +21,7 @@ from missions.model import (
     Signals,
     Speed,
     Step,
+    SwitchFence,
     Takeoff,
     Term,
     Trajectory,
@@ -66,6 +67,8 @@ def describe(step: Step, released: bool) -> str:
         case Speed():
             limit = "the usual speed" if step.speed_m_s is None else f"{step.speed_m_s:g} m/s"
             return f"From here on at most {limit}"
+        case SwitchFence():
+            return f"Switch the fence {'on' if step.on else 'off'}"
         case Delay():
             return f"Hold for {step.duration_s:g} s"
         case ReturnHome():

@@ -65,7 +65,7 @@ def test_every_command_has_one_row_and_every_record_is_written_by_one() -> None:
         (mavlink.MAV_CMD_NAV_LAST + 1, Handling.REFUSED),
         (31998, Handling.REFUSED),
         (mavlink.MAV_CMD_DO_PARACHUTE, Handling.REFUSED),
-        (mavlink.MAV_CMD_DO_FENCE_ENABLE, Handling.REFUSED),
+        (mavlink.MAV_CMD_DO_FENCE_ENABLE, Handling.FLOWN),
         (mavlink.MAV_CMD_DO_GUIDED_LIMITS, Handling.REFUSED),
         (mavlink.MAV_CMD_WAYPOINT_USER_5, Handling.REFUSED),
         (mavlink.MAV_CMD_DO_LAND_START, Handling.KEPT),

@@ -141,6 +141,8 @@ def allowed(key: str, field: FieldInfo) -> str:
     words = re.findall(r"'(\w+)'", str(field.annotation)) if "Literal" in str(field.annotation) else []
     if words:
         return " or ".join(f'`"{word}"`' for word in words)
+    if field.annotation is bool:
+        return "`true` or `false`"
     if key == "rate_hz":
         return '> 0 and <= 20000, or `"tick"`'
     if "str" in str(field.annotation):

@@ -31,7 +31,10 @@ FRAME = 'title = "T"\n[[items]]\ntype = "takeoff"\naltitude_m = 2\n{}\n[[items]]
 WAYPOINT = '[[items]]\ntype = "waypoint"\neast_m = 1.0\nnorth_m = -2.0\naltitude_m = 3.0\n'
 SIGNALS = '[[items]]\ntype = "signals"\nduration_s = 9.0\n'
 TERM = '[[items.terms]]\naxis = "z"\namplitude_m = 0.2\nrise_s = 2.0\n'
-KINDS = "takeoff, waypoint, speed, delay, signals, trajectory, attitude, return, release, place, winch, land"
+KINDS = (
+    "takeoff, waypoint, speed, fence, delay, signals, trajectory, attitude, return, release, place, winch, "
+    "land"
+)
 FACTOR = "[[items.terms.factors]]\nperiod_s = 1.5\n"
 
 

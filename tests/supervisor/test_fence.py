@@ -311,6 +311,46 @@ def test_a_mission_that_leaves_it_is_refused_with_the_item() -> None:
     assert free.ask(ReplaceMission(3, located)).result == ACCEPTED
 
 
+def test_items_that_switch_the_fence_count_for_the_ways_behind_them() -> None:
+    inside, outside = Waypoint(0.0, 0.0, 2.0), Waypoint(8.0, 0.0, 2.0)
+    on, off = model.SwitchFence(True), model.SwitchFence(False)
+    up, down = model.Takeoff(2.0), model.Land()
+    for steps, enabled, why in (
+        ((up, off, outside, inside, on, down), True, ""),
+        ((up, off, outside, inside, on, outside, down), True, "item 5"),
+        ((up, outside, inside, down), False, ""),
+        ((up, on, outside, inside, down), False, "item 2"),
+        ((up, outside, off, inside, down), True, "item 1"),
+    ):
+        sky = fenced(*steps)
+        sky.ask(EnableFence(enabled))
+        located = tuple(LocatedStep(i, i, step) for i, step in enumerate(steps))
+        asked = (sky.ask(ReplaceMission(len(steps), located)), sky.ask(StartMission(None)))
+        for verdict in asked:
+            assert (verdict.result == DENIED) == bool(why), steps
+            assert f"Mission denied: {why}" in (verdict.text or "Mission denied: "), steps
+
+
+@pytest.mark.parametrize("is_off", [True, False])
+def test_a_mission_flies_out_while_its_fence_is_off(is_off: bool) -> None:
+    out, back = Waypoint(8.0, 0.0, 2.0), Waypoint(0.0, 0.0, 2.0)
+    switched = (model.SwitchFence(False), out, back, model.SwitchFence(True))
+    sky = fenced(model.Takeoff(2.0), *(switched if is_off else (back,)), model.Land())
+    begin = sky.flight.area.fence_enabled
+    assert sky.ask(StartMission(None)).result == ACCEPTED
+    assert sky.ask(Arm(True, False)).result == ACCEPTED
+    seen = set()
+
+    def is_down(sky: Sky) -> bool:
+        seen.add(sky.flight.area.fence_enabled)
+        return sky.flight.phase == Phase.DISARMED
+
+    sky.run(is_down)
+    assert begin and sky.flight.area.fence_enabled
+    assert (False in seen) == is_off
+    assert sky.flight.area.breaches == 0
+
+
 def test_no_arming_outside() -> None:
     sky = fenced()
     sky.flight = replace(

@@ -24,11 +24,11 @@ from autopilot.supervisor.state import (
     fence_problem,
     first_fence_violation,
     has_fence,
-    is_fence_active,
     load_position_below,
     measured_fence_violation,
 )
 from autopilot.supervisor.step_legs import NEAR_START
+from autopilot.supervisor.watches.fence import NO_ACTION
 from autopilot.trajectory.load_path import path_tables
 from autopilot.trajectory.prepare import MissionBegin, waypoint_path_starts
 from autopilot.trajectory.shaping import requested_jets
@@ -78,7 +78,12 @@ def upload_problem(flight: Flight, plan: MissionPlan, view: View, settings: Sett
 
     On the ground the mission begins where the load stands; in the air it may begin anywhere.
     """
-    start = replace(ANYWHERE, cable_m=settings.cable_length_m, released=flight.cable.released)
+    start = replace(
+        ANYWHERE,
+        cable_m=settings.cable_length_m,
+        released=flight.cable.released,
+        fence_on=flight.area.fence_enabled,
+    )
     if flight.phase in ON_GROUND:
         start = _on_ground(flight, view, settings)
     home = flight.area.home
@@ -113,7 +118,9 @@ def remaining_timeline(flight: Flight, view: View, settings: Settings) -> Remain
             here = mission.step_anchor  # its path counts from where it began
         if cable.reel_target_m is not None and isinstance(steps[0], Winch):  # resumed
             steps = (replace(steps[0], length_m=cable.reel_target_m - length), *steps[1:])
-        start = MissionState(here, cable_m=length, released=cable.released)
+        start = MissionState(
+            here, cable_m=length, released=cable.released, fence_on=flight.area.fence_enabled
+        )
     return list(zip(sequence, timeline(steps, start, flight.area.home), strict=True))
 
 
@@ -141,7 +148,7 @@ def repeated_steps(plan: MissionPlan, ahead: RemainingSteps, home: Vec3) -> Rema
 
 def _is_same_state(a: MissionState, b: MissionState) -> bool:
     """Whether a step leads the same way from either state."""
-    if (a.released, a.unknown_after) != (b.released, b.unknown_after):
+    if (a.released, a.unknown_after, a.fence_on) != (b.released, b.unknown_after, b.fence_on):
         return False
     if a.expected is None or b.expected is None or a.cable_m is None or b.cable_m is None:
         return (a.expected, a.cable_m) == (b.expected, b.cable_m)
@@ -195,7 +202,8 @@ def _on_ground(flight: Flight, view: View, settings: Settings) -> MissionState:
     released = flight.cable.released
     here = view.x_quad if released else view.x_load
     start = ANYWHERE if view.estimate_problems else MissionState(here)
-    return replace(start, cable_m=settings.cable_length_m, released=released)
+    fence_on = flight.area.fence_enabled
+    return replace(start, cable_m=settings.cable_length_m, released=released, fence_on=fence_on)
 
 
 def fence_exit_problem(flight: Flight, ahead: RemainingSteps, settings: Settings) -> str:
@@ -204,10 +212,10 @@ def fence_exit_problem(flight: Flight, ahead: RemainingSteps, settings: Settings
     This checks the straight ways to take-off height, to waypoints and home, the paths of signals and
     trajectories, and the place at which the winch leaves the load; for curves there is `curve_exit_problem`.
     """
-    if not (is_fence_active(flight, settings) and has_fence(flight, settings)):
+    if settings.fence.action == NO_ACTION or not has_fence(flight, settings):
         return ""
     for seq, entry in ahead:
-        reason = _violation_of_step(flight, entry, settings)
+        reason = _violation_of_step(flight, entry, settings) if entry.before.fence_on else ""
         if reason:
             return f"item {seq} {_leading(reason)}"
     return ""
@@ -286,13 +294,13 @@ def _settings_after(entry: TimelineEntry, settings: Settings) -> Settings:
 def curve_exit_problem(flight: Flight, ahead: RemainingSteps, settings: Settings) -> str:
     """Which item is reached on a curve through waypoints that leads beyond the fence, and why; an empty
     string if none is, or if the curves are not prepared yet."""
-    if not (is_fence_active(flight, settings) and has_fence(flight, settings)):
+    if settings.fence.action == NO_ACTION or not has_fence(flight, settings):
         return ""
     mission = flight.mission
     paths = mission.plan.prepared.paths[mission.step :]
     table = None  # of the path that is flown
     for path, (seq, entry) in zip(paths, ahead[len(ahead) - len(paths) :], strict=True):
-        if not isinstance(path, PathSegment):
+        if not isinstance(path, PathSegment) or not entry.before.fence_on:
             continue
         if path.begin_s == 0.0 and norm(sub(entry.begin, path.start)) < NEAR_START:
             table = path.table

@@ -83,7 +83,7 @@ def set_home(flight: Flight, request: SetHome, view: View, settings: Settings) -
 
 def enable_fence(flight: Flight, request: EnableFence, view: View, settings: Settings) -> Decision:
     """Enable or disable the fence; a previous breach is forgotten."""
-    area = replace(flight.area, fence_enabled=request.on, breach="")
+    area = flight.area.with_fence_switched(request.on)
     return replace(flight, area=area), Verdict(ACCEPTED.result, f"Fence {'on' if request.on else 'off'}")
 
 

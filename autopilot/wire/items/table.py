@@ -52,6 +52,7 @@ from missions.model import (
     Signals,
     Sine,
     Speed,
+    SwitchFence,
     Takeoff,
     Term,
     TrajectoryPoint,
@@ -91,7 +92,6 @@ _UNSAFE_TO_IGNORE = (
     m.MAV_CMD_DO_SET_HOME,
     m.MAV_CMD_DO_SET_PARAMETER,
     m.MAV_CMD_DO_FLIGHTTERMINATION,
-    m.MAV_CMD_DO_FENCE_ENABLE,
     m.MAV_CMD_DO_PARACHUTE,
     m.MAV_CMD_DO_REPOSITION,
     m.MAV_CMD_DO_ORBIT,
@@ -200,6 +200,15 @@ COMMANDS: tuple[Command, ...] = (
         is_default=True,
         constants={"param1": 1.0, "param3": -1.0},
         read_steps=readers.change_speed,
+    ),
+    Command(
+        m.MAV_CMD_DO_FENCE_ENABLE,
+        "the fence is in force or not from the end of the item before it on (before the take-off: when the "
+        "load is lifted), also beyond the mission. The items behind it are checked accordingly before the "
+        "flight",
+        (Choice(1, "on", "fence", {0: False, 1: True}),),
+        SwitchFence,
+        is_default=True,
     ),
     Command(
         m.MAV_CMD_CONDITION_YAW,
