@@ -18,6 +18,7 @@ from autopilot.wire.parameter_names import unknown_parameter_text
 from autopilot.wire.parameter_table import ParameterError, ParameterTable
 from gcs.errors import InputError, input_error
 from gcs.workflows.flight_options import SIMULATOR_PREFIX
+from gcs.workflows.slow_rotors import slow_rotor_warnings
 from missions.toml_files import FileError
 from sitl.sensors.files import load_profile
 from sitl.settings import settings_of
@@ -26,6 +27,10 @@ from sitl.vehicles.truth import truth_of
 
 _MAX_THRUST_RATIO = 20.0  # thrust over weight; racing multirotors without a load have up to 15
 _G_N = 1e-3 * STANDARD_GRAVITY  # weight of a gram
+# Least mass of a load, as a share of the vehicle's: the cable counts as taut when its pull is three tenths of
+# the load's weight for a tenth of a second. Measured, the pull varies by 0.4 % of the vehicle's weight (one
+# standard deviation) with the noise of the shipped inertial units, and by 3 % with vibration.
+_FELT_SHARE, _FELT_IN_VIBRATION_SHARE = 0.01, 0.1
 _MIN_HOVER_W_KG = 60.0  # rotors that are large for their load need 70, those of usual vehicles 100 to 250
 
 
@@ -96,8 +101,9 @@ def _too_little_power(hover_w: float, mass_kg: float) -> str:
 
 def vehicle_warnings(vehicle: str) -> list[str]:
     """A line each if the file of the vehicle chooses a law (in flights of `gcs` that of `--law` flies), if
-    its rotors give many times its weight or have more drag torque than any propeller, if its cable is shorter
-    than its arms, and if no vehicle of its mass hovers with the power of its battery."""
+    its rotors give many times its weight, have more drag torque than any propeller or are slow, if its load
+    is too light to be felt, if its cable is shorter than its arms, and if no vehicle of its mass hovers with
+    the power of its battery."""
     found, believed = load_truth_and_belief(vehicle)
     warnings = []
     if "CTL_LAW" in believed.parameters:
@@ -116,6 +122,17 @@ def vehicle_warnings(vehicle: str) -> list[str]:
             f"{vehicle}: torque_ratio_m = {found.torque_ratio_m:g} is more than the radius of a rotor, "
             f"{found.rotor_radius_m:.2g} m: usual is 0.1 to 0.2 of it, {0.1 * found.rotor_radius_m:.2g} to "
             f"{0.2 * found.rotor_radius_m:.2g}; check it, and arm_m"
+        )
+    warnings += [f"{vehicle}: {line}" for line in slow_rotor_warnings(autopilot_parameters(believed))]
+    load_share = found.load_mass_kg / found.quad_mass_kg
+    if load_share < _FELT_IN_VIBRATION_SHARE:
+        least, noise = _FELT_IN_VIBRATION_SHARE, "vibration (sensors lab-real, field)"
+        if load_share < _FELT_SHARE:
+            least, noise = _FELT_SHARE, "the noise of the inertial unit"
+        warnings.append(
+            f"{vehicle}: load_mass_kg = {found.load_mass_kg:g} is {100.0 * load_share:.2g} % of "
+            f"quad_mass_kg: below {100.0 * least:g} % the pull of the cable may be lost in {noise}; "
+            'then the flight ends with "Cable never taut"'
         )
     if found.cable_length_m < found.arm_m:
         warnings.append(

@@ -13,6 +13,7 @@ from gcs.mission_files import load
 from gcs.mission_items import items_of, problem_in_file
 from gcs.workflows.flight_options import Settings
 from gcs.workflows.flyable_marks import mark_flyable
+from gcs.workflows.slow_rotors import slow_rotor_violations
 from gcs.workflows.vehicle_limits import load_limits, with_settings
 from missions.model import Mission, Winch
 
@@ -56,6 +57,7 @@ def violations(
     items_of(mission, home_of(mission))
     table = with_settings(autopilot_parameters(limits.vehicle), settings)
     found = [
+        *slow_rotor_violations(table),
         *check(mission, limits, shapes_paths(table, follows_shaped)),
         *list(winch_violations(mission, table))[:1],
     ]

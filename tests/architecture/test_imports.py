@@ -157,6 +157,7 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
         "sitl.sensors.overrides",
         "sitl.vehicles",
     ),
+    "gcs.workflows.slow_rotors": (*GCS, "gcs", "autopilot.control.believed"),
     "gcs.workflows.charge": (
         *GCS,
         "gcs",

@@ -110,7 +110,7 @@ taut](troubleshooting.md#cable-never-taut-landing-), and neither was it with 30 
 [slack](troubleshooting.md#cable-slack-falling-with-the-load-to-catch-it) while the load was lifted, and the
 load fell to the ground; with 30 % `case-b` was flown with an error of 57 mm.
 
-## How heavy the load may be
+## How heavy or light the load may be
 
 The rotors decide it: `gcs check` refuses a load that they cannot carry. Vehicles of 1 to 3 kg whose rotors
 gave 2.2 times the weight flew `hover`, `delivery` and `square` with loads of 0.1 to 5 times their own mass on
@@ -118,6 +118,29 @@ cables of 0.3 to 2 m, with `ideal`, `lab`, `rtk` and other sensors. The cable ca
 error did not depend on the load. The cable of a load without a tracker counts as taut once it pulls with most
 of the load's weight, which takes longer with heavier loads: 17 s for five times the mass of the vehicle
 instead of 3 s for half of it. The law `lqr` lost loads of five times the mass.
+
+The cable counts as taut once it has pulled with three tenths of the load's weight for a tenth of a second. A
+load that is very light beside its vehicle is not felt: measured, its pull varies by 0.4 % of the vehicle's
+weight (one standard deviation) with the noise of the inertial unit, and by 3 % with the vibration of
+`lab-real` and `field`. A vehicle of 1.2 kg lifted loads of 0.7 % of its mass and more with `lab`, 0.5 % with
+`rtk` and `gps`, 5 % with `field`, and 10 % with `lab-real`; with lighter ones, some or all flights ended with
+`Cable never taut`. `gcs check` and `gcs fly` warn of a load below 1 %, and of one below 10 % because of
+vibration.
+
+## How slow the rotors may be
+
+The greater `rotor_tau_s`, the lower the bandwidth at which the law controls the attitude, and the position
+cannot be held with an attitude that follows more slowly than twice its own bandwidth, 2.5 rad/s. `bebop`,
+`heavy`, `octorotor` and the vehicle of `gcs new vehicle` flew `hover` with `ideal`, `lab` and `rtk`:
+
+| `rotor_tau_s` | 0.1 | 0.2 | 0.22 | 0.25 | 0.3 | 0.4 ... 1 |
+|---|---|---|---|---|---|---|
+| attitude bandwidth, rad/s | 9.0 to 9.4 | 4.9 to 5.6 | 4.6 to 5.3 | 4.2 to 4.9 | 3.6 to 4.5 | 0.5 to 4.0 |
+| greatest error, m | 0.08 | 0.5 | 0.7 | 1.9, a fifth lost | all lost | all lost |
+
+`gcs check` and `gcs fly` warn below 5.8 rad/s, and refuse a vehicle below 4.2 rad/s. A delay lowers the
+bandwidth far less, because the law predicts over it: with 200 ms that the autopilot knew (`VEH_ACT_DELAY`),
+`bebop` and `heavy` kept 8 rad/s and flew `hover` with errors of 0.03 to 0.1 m.
 
 ## Rotors
 

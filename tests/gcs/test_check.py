@@ -340,6 +340,20 @@ def test_a_load_that_is_set_too_heavy_is_found_before_the_flight() -> None:
         flyable.require_flyable(load("hover"), "bebop", settings=[heavy])
 
 
+def test_a_vehicle_whose_rotors_are_too_slow_to_hover_is_refused() -> None:
+    slow = parse_setting("VEH_ROTOR_TAU=300")
+    (line,) = check_mission("hover", "heavy", False, settings=[slow]).lines()
+    assert line.startswith(
+        "rotor_tau_s = 0.3: rotors this slow let the vehicle control its attitude at 3.6 rad/s"
+    )
+    assert line.endswith("4.2 rad/s are needed to hold its position: it cannot hover; use faster rotors")
+    with pytest.raises(GcsError, match="cannot hover"):
+        flyable.require_flyable(load("hover"), "heavy", settings=[slow])
+    assert (
+        "can fly it" in check_mission("hover", "heavy", False, settings=[("VEH_ROTOR_TAU", 200.0)]).lines()[0]
+    )
+
+
 PLANNERS = """
 from plumbline.examples.minimum_snap import MinimumSnap
 from plumbline.planners import slower

@@ -280,3 +280,29 @@ def test_a_cable_that_is_shorter_than_the_arms_is_told(tmp_path):
         bebop.replace(cable_length_m=length, load_radius_m=0.01).save(file)
         assert len(vehicle_warnings(str(file))) == told
     assert "cable_length_m = 0.12 is less than arm_m, 0.126" in vehicle_warnings(str(file))[0]
+
+
+@pytest.mark.parametrize(
+    ("share", "told"),
+    [
+        (0.1, ""),
+        (0.03, "below 10 % the pull of the cable may be lost"),
+        (0.005, "below 1 % the pull of the cable may be lost"),
+    ],
+)
+def test_a_load_too_light_to_be_felt_is_told(tmp_path, share, told):
+    file, bebop = tmp_path / "mine.toml", plumbline.Vehicle.load("bebop")
+    bebop.replace(load_mass_kg=share * bebop.quad_mass_kg).save(file)
+    lines = vehicle_warnings(str(file))
+    assert [told in line for line in lines] == ([True] if told else [])
+    assert all(f"is {100.0 * share:.2g} % of quad_mass_kg" in line for line in lines)
+
+
+@pytest.mark.parametrize(("lag_s", "warned"), [(0.15, False), (0.22, True)])
+def test_rotors_with_which_the_load_sways_are_told(tmp_path, lag_s, warned):
+    file = tmp_path / "mine.toml"
+    plumbline.Vehicle.load("bebop").replace(rotor_tau_s=lag_s).save(file)
+    lines = vehicle_warnings(str(file))
+    assert ["5.3 rad/s, and 5.8 rad/s are needed to hold its position steadily" in one for one in lines] == (
+        [True] if warned else []
+    )
