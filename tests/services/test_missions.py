@@ -290,7 +290,7 @@ def test_the_vehicle_speaks_to_the_uploader_alone(rig, items):
     [
         (WireItem(6, 84, 0, 1, 0, 0, 0, 0, 0, 0, 5.0), m.MAV_MISSION_UNSUPPORTED),
         (WireItem(10, 16, 0, 1, 0, 0, 0, 0, 473977420, 85455940, 5.0), m.MAV_MISSION_UNSUPPORTED_FRAME),
-        (WireItem(6, 16, 0, 1, math.nan, 0, 0, 0, 473977420, 85455940, 5.0), m.MAV_MISSION_INVALID_PARAM1),
+        (WireItem(6, 16, 0, 1, -1.0, 0, 0, 0, 473977420, 85455940, 5.0), m.MAV_MISSION_INVALID_PARAM1),
         (WireItem(6, 16, 0, 1, 0, 0, 0, 0, 2**31 - 1, 0, 5.0), m.MAV_MISSION_INVALID_PARAM5_X),
         (WireItem(6, 16, 0, 1, 0, 0, 0, 0, 473977420, 85455940, math.nan), m.MAV_MISSION_INVALID_PARAM7),
     ],
