@@ -34,6 +34,13 @@ def start(*arguments: str) -> subprocess.Popen[str]:
     )
 
 
+def wait_until_told(process: subprocess.Popen[str], text: str) -> None:
+    """Read what it prints up to a line with this text; the first start also tells what it compiles."""
+    assert process.stdout is not None
+    while text not in (line := process.stdout.readline()):
+        assert line, f"it ended without: {text}"
+
+
 class Pilot:
     """A socket that behaves like an autopilot."""
 
@@ -68,8 +75,7 @@ def port() -> int:
 @pytest.fixture
 def lockstep_sitl(port: int) -> Iterator[subprocess.Popen[str]]:
     process = start("--lockstep", "--listen", f"127.0.0.1:{port}", "--truth", f"127.0.0.1:{free_port()}")
-    assert process.stdout is not None
-    assert "waiting for an autopilot" in process.stdout.readline()
+    wait_until_told(process, "waiting for an autopilot")
     yield process
     process.kill()
     process.communicate()
@@ -116,8 +122,7 @@ def test_real_time_over_udp(port: int) -> None:
         *("--real-time", "--speed", "4", "--sensors", "ideal", "--listen", f"127.0.0.1:{port}"),
         *("--truth", f"127.0.0.1:{free_port()}"),
     )
-    assert process.stdout is not None
-    assert "at 4 x real time, without waiting for answers" in process.stdout.readline()
+    wait_until_told(process, "at 4 x real time, without waiting for answers")
     pilot = Pilot(port)
     pilot.greet()
     times = []
@@ -134,8 +139,7 @@ def test_real_time_over_udp(port: int) -> None:
 
 def test_the_clock_goes_no_faster_than_it_may_and_waits(port: int) -> None:
     process = start("--speed", "10", "--listen", f"127.0.0.1:{port}")
-    assert process.stdout is not None
-    assert "at 10 x real time, slower on a busy machine" in process.stdout.readline()
+    wait_until_told(process, "at 10 x real time, slower on a busy machine")
     pilot = Pilot(port)
     pilot.greet()
     time_us = pilot.sensors()[1]
@@ -153,8 +157,7 @@ def test_the_clock_goes_no_faster_than_it_may_and_waits(port: int) -> None:
 
 def test_a_long_wait_for_the_autopilot_is_told(port: int) -> None:
     process = start("--listen", f"127.0.0.1:{port}", "--truth", f"127.0.0.1:{free_port()}")
-    assert process.stdout is not None
-    process.stdout.readline()
+    wait_until_told(process, "waiting for an autopilot")
     pilot = Pilot(port)
     pilot.greet()
     time_us = pilot.sensors()[1]
