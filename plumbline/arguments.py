@@ -30,7 +30,7 @@ _PHRASES = (  # phrases of the command line, and their equivalents in Python
     (r"(?<=another folder) by --out\b", ""),
     (r"add --fresh to", "give fresh=True to"),
     (r"(?<=has it, or )without it: --ignore (\w+)", r"leave \1 out of the vehicle's parameters"),
-    (r"; --skip uploads the rest$", ""),
+    (r"--skip uploads", "skip=True uploads"),
     (r"--force tries:;?", "force=True tries:"),
     (r"--law\b(?= says|[^s]*instead)", "laws"),
     (r"; see gcs [a-z ]*--help$", ""),

@@ -247,18 +247,20 @@ class RunningVehicle:
         *,
         vehicle: str | PathLike[str] | Vehicle = "bebop",
         force: bool = False,
+        skip: bool = False,
     ) -> None:
         """Upload a mission to the vehicle: a shipped name, a file (.toml, .plan, .waypoints), or a `Mission`.
 
         The mission is first checked against the limits of `vehicle`, unless `force`. What the vehicle does
-        not fly as in a file of another ground station causes a warning.
+        not fly as in a file of another ground station causes a warning; what it cannot fly raises `Error`, or
+        with `skip` is left out.
         """
         if isinstance(mission, model.Mission) and not isinstance(mission, Mission):
             mission = Mission(mission.name, mission.steps, mission.title)
         path, checked = name_or_path("mission", mission), name_or_path("vehicle", vehicle)
         notes: list[str] = []
         with errors_for_python():
-            send = checked_upload(path, checked, force, False, lambda _: None, notes.append, quiet=True)
+            send = checked_upload(path, checked, force, skip, lambda _: None, notes.append, quiet=True)
         try:
             with errors_for_python():
                 self._with_retries(lambda: send(self._session))

@@ -481,12 +481,14 @@ def test_an_upload_prints_nothing_and_warns_of_what_is_not_as_in_the_file(
         with pytest.warns(UserWarning, match=r"other\.waypoints: ") as told:
             vehicle.upload(file, force=force)
         file.write_text(file.read_text().replace("47.397742", "47.5", 1), encoding="utf-8")
-        not_flown = pytest.raises(plumbline.Error, match=r"other\.waypoints: 1 thing is not flown$")
+        not_flown = pytest.raises(plumbline.Error, match=r"1 thing is not flown; skip=True uploads the rest$")
         with pytest.warns(UserWarning) as left_out, not_flown:
             vehicle.upload(file, force=force)
         assert any(
             "the home row, but the vehicle's home is elsewhere" in str(one.message) for one in left_out
         )
+        with pytest.warns(UserWarning, match="the home row"):
+            vehicle.upload(file, force=force, skip=True)
     assert {one.filename for one in told} == {__file__}
     assert capfd.readouterr() == ("", "")
 
