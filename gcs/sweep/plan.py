@@ -10,7 +10,6 @@ import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from functools import lru_cache
 from itertools import product
 from typing import Any, TypeVar
 
@@ -256,7 +255,6 @@ def own_parameter_names(own: OwnCode) -> frozenset[str]:
     return frozenset(parameter.name for one in own.load_classes() for parameter in one.parameters)
 
 
-@lru_cache(maxsize=64)
 def _foreign_parameters(laws: tuple[str, ...], own: OwnCode) -> frozenset[str]:
     """The parameters that custom classes among `laws` define, but no class of `own`, which flies."""
     of_laws = (own_parameter_names(OwnCode(own_law_reference(law))) for law in laws)

@@ -175,6 +175,20 @@ def test_parameters_of_a_custom_law_are_for_the_laws_that_have_them(short: str, 
         planned(short, [gain], {})
 
 
+def test_the_parameters_of_a_law_whose_file_has_changed_are_those_that_it_has_now(
+    short: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "mine.py"
+
+    def foreign(source: str) -> frozenset[str]:
+        path.write_text(source, encoding="utf-8")
+        plan = make_plan(short, "bebop", "lab", ["thesis", f"{path}:Mine"], [1], [], {}, 0)
+        return plan.foreign_to("thesis")
+
+    assert foreign(OWN_LAW) == {"MY_GAIN", "MY_OFFSET"}
+    assert foreign(OWN_LAW.replace("MY_OFFSET", "MY_BIAS")) == {"MY_GAIN", "MY_BIAS"}
+
+
 def test_a_vehicle_is_delivered_with_the_parameters_of_one_law_among_others(
     short: str, tmp_path: Path
 ) -> None:
