@@ -106,11 +106,11 @@ def check_command(
     from gcs.workflows.flight_options import parse_setting
 
     given = [parse_setting(one) for one in settings]
-    check_parameters(vehicle, planner or "", ignore)
+    delivered = check_parameters(vehicle, planner or "", ignore)
     if planner:
         from gcs.workflows.own_planner import own_planner
 
-        with own_planner(planner, vehicle, ignore) as own:
+        with own_planner(planner, delivered.values()) as own:
             found = check_mission(mission, vehicle, as_asked, own, given, law or "")
     else:
         with notify_if_slow(CHECKING_TEXT, as_json):

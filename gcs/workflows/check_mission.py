@@ -25,6 +25,7 @@ from autopilot.vehicle.parameters import (
 )
 from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.items import decode_items
+from autopilot.wire.parameter_table import ParameterTable
 from gcs.errors import GcsError, InputError
 from gcs.expected_flight import expected_entries, expected_flight_s, limit_text, time_limit_s
 from gcs.foreign_mission import ForeignMission, home_text
@@ -354,15 +355,16 @@ def _with_charge(found: CheckResult, mission: Mission, table: AutopilotParameter
     return replace(found, battery_left_pct=100.0 * charge.left, warnings=warnings)
 
 
-def check_parameters(vehicle: str, planner: str, ignored: Collection[str]) -> None:
-    """GcsError if the vehicle is delivered with a parameter that neither the autopilot nor the `planner` has
-    and that is not `ignored`: flights without the custom code that has it are refused. So is one of the
-    autopilot's own among those `ignored`, as paths are judged by it."""
+def check_parameters(vehicle: str, planner: str, ignored: Collection[str]) -> ParameterTable:
+    """The parameters of the autopilot and of the `planner` with which the vehicle is delivered. GcsError if
+    it is delivered with one that neither has and that is not `ignored`: flights without the custom code that
+    has it are refused. So is one of the autopilot's own among those `ignored`, as paths are judged by it."""
     table = delivered_parameters(vehicle, OwnCode(planner=planner), ignored)
     for name in ignored:
         if name in table:
             text = f"the mission is checked with it; --set {name}=VALUE gives it another value"
             raise InputError(f"--ignore {name}: {text}")
+    return table
 
 
 def check_mission(

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 
-from autopilot.own.own_code import OwnCode, naming_option
+from autopilot.own.own_code import naming_option
 from autopilot.own.planner import load_planner
 from autopilot.own.planning import plan_function
 from autopilot.own.source import OwnError
@@ -13,16 +13,13 @@ from autopilot.own.trial import try_planner
 from autopilot.shell.watched_calls import watched_calls
 from autopilot.trajectory.route import Planner
 from gcs.errors import InputError
-from gcs.workflows.flight_inputs import delivered_parameters
 
 
 @contextmanager
-def own_planner(reference: str, vehicle: str, ignored: Collection[str]) -> Iterator[Planner]:
-    """The planner with its default parameters for a vehicle, and with its calls watched. GcsError if there is
-    no such vehicle, if it is delivered with parameters that are unknown and not `ignored`, if the planner
+def own_planner(reference: str, values: Mapping[str, float]) -> Iterator[Planner]:
+    """The planner with these values of the parameters, and with its calls watched. GcsError if the planner
     cannot be loaded, or if it fails on the routes of a trial, as before a flight."""
     with watched_calls():
-        values = delivered_parameters(vehicle, OwnCode(planner=reference), ignored).values()
         try:
             loaded = load_planner(reference)
             with naming_option("planner"):

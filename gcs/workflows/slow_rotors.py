@@ -20,39 +20,36 @@ STEADY_RATIO, MIN_RATIO = 2.3, 1.7
 _FAST_LAG_S = 0.1  # rotors that are faster allow several times these ratios: they need not be computed
 
 
-def _bandwidths(table: AutopilotParameters) -> tuple[float, float]:
-    """Bandwidths (rad/s) of the attitude and of the position for a vehicle with these parameters."""
+def _too_slow(table: AutopilotParameters, least_ratio: float) -> tuple[float, float, str] | None:
+    """The attitude's bandwidth and the one that it must have (rad/s) for this ratio to that of the position,
+    and a text about both; None if it has it."""
+    lag_s = 1e-3 * table["VEH_ROTOR_TAU"]
+    if lag_s <= _FAST_LAG_S:
+        return None
     from autopilot.control.believed import believed_design, believed_vehicle  # loads the laws
 
     vehicle = believed_vehicle(table)
-    return believed_design(table, vehicle).omega_R, sqrt(table["QP_KX"] / vehicle.quad_mass)
-
-
-def _lag_text(table: AutopilotParameters, attitude: float, least: float) -> str:
-    return (
-        f"rotor_tau_s = {1e-3 * table['VEH_ROTOR_TAU']:g}: rotors this slow let the vehicle control its "
+    attitude = believed_design(table, vehicle).omega_R
+    least = least_ratio * sqrt(table["QP_KX"] / vehicle.quad_mass)
+    if attitude >= least:
+        return None
+    text = (
+        f"rotor_tau_s = {lag_s:g}: rotors this slow let the vehicle control its "
         f"attitude at {attitude:.1f} rad/s, and {least:.1f} rad/s are needed to hold its position"
     )
+    return attitude, least, text
 
 
 def slow_rotor_violations(table: AutopilotParameters) -> list[Violation]:
     """The violation of a vehicle whose rotors are too slow to hold it in place; empty if they are not."""
-    if 1e-3 * table["VEH_ROTOR_TAU"] <= _FAST_LAG_S:
+    found = _too_slow(table, MIN_RATIO)
+    if found is None:
         return []
-    attitude, position = _bandwidths(table)
-    least = MIN_RATIO * position
-    if attitude >= least:
-        return []
-    text = f"{_lag_text(table, attitude, least)}: it cannot hover; use faster rotors"
-    return [Violation(0, "bandwidth", attitude, least, 0.0, text)]
+    attitude, least, text = found
+    return [Violation(0, "bandwidth", attitude, least, 0.0, f"{text}: it cannot hover; use faster rotors")]
 
 
 def slow_rotor_warnings(table: AutopilotParameters) -> list[str]:
     """A line if the rotors are so slow that the load sways by tenths of a metre, or worse."""
-    if 1e-3 * table["VEH_ROTOR_TAU"] <= _FAST_LAG_S:
-        return []
-    attitude, position = _bandwidths(table)
-    least = STEADY_RATIO * position
-    if attitude >= least:
-        return []
-    return [f"{_lag_text(table, attitude, least)} steadily: the load sways, or is lost; use faster rotors"]
+    found = _too_slow(table, STEADY_RATIO)
+    return [] if found is None else [f"{found[2]} steadily: the load sways, or is lost; use faster rotors"]

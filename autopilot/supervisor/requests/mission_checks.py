@@ -78,14 +78,11 @@ def upload_problem(flight: Flight, plan: MissionPlan, view: View, settings: Sett
 
     On the ground the mission begins where the load stands; in the air it may begin anywhere.
     """
-    start = replace(
-        ANYWHERE,
-        cable_m=settings.cable_length_m,
-        released=flight.cable.released,
-        fence_on=flight.area.fence_enabled,
+    start = (
+        _on_ground(flight, view, settings)
+        if flight.phase in ON_GROUND
+        else _with_present(ANYWHERE, flight, settings.cable_length_m)
     )
-    if flight.phase in ON_GROUND:
-        start = _on_ground(flight, view, settings)
     home = flight.area.home
     ahead = list(zip(plan.sequence, timeline(plan.steps, start, home), strict=True))
     return (
@@ -118,9 +115,7 @@ def remaining_timeline(flight: Flight, view: View, settings: Settings) -> Remain
             here = mission.step_anchor  # its path counts from where it began
         if cable.reel_target_m is not None and isinstance(steps[0], Winch):  # resumed
             steps = (replace(steps[0], length_m=cable.reel_target_m - length), *steps[1:])
-        start = MissionState(
-            here, cable_m=length, released=cable.released, fence_on=flight.area.fence_enabled
-        )
+        start = _with_present(MissionState(here), flight, length)
     return list(zip(sequence, timeline(steps, start, flight.area.home), strict=True))
 
 
@@ -199,11 +194,15 @@ def _on_ground(flight: Flight, view: View, settings: Settings) -> MissionState:
 
     The position is unknown (`ANYWHERE`) while the estimate is not fit for flight.
     """
-    released = flight.cable.released
-    here = view.x_quad if released else view.x_load
+    here = view.x_quad if flight.cable.released else view.x_load
     start = ANYWHERE if view.estimate_problems else MissionState(here)
-    fence_on = flight.area.fence_enabled
-    return replace(start, cable_m=settings.cable_length_m, released=released, fence_on=fence_on)
+    return _with_present(start, flight, settings.cable_length_m)
+
+
+def _with_present(state: MissionState, flight: Flight, cable_m: float) -> MissionState:
+    """The state with load and fence as they are now."""
+    released, fence_on = flight.cable.released, flight.area.fence_enabled
+    return replace(state, cable_m=cable_m, released=released, fence_on=fence_on)
 
 
 def fence_exit_problem(flight: Flight, ahead: RemainingSteps, settings: Settings) -> str:
