@@ -19,7 +19,13 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from autopilot.estimation.covariance import add_jacobian_entry
-from autopilot.estimation.history import correct_past_states, interpolate3, interpolate4, row_before
+from autopilot.estimation.history import (
+    correct_past_states,
+    interpolate3,
+    interpolate4,
+    reset_past_states,
+    row_before,
+)
 from autopilot.estimation.records import (
     ACCEL_BIAS,
     ACROSS,
@@ -189,6 +195,18 @@ def with_capacity(state: EstimatorState, age: float, size: int) -> EstimatorStat
 def vehicle_with_status(v: VehicleEstimate, age_s: float, rejected: float) -> VehicleEstimate:
     """The vehicle with another age and count of rejections."""
     return with_field(with_field(v, "age_s", age_s), "rejected", rejected)
+
+
+@kernel
+def restarted_vehicle(
+    old: VehicleEstimate, history: History, x: Vec3, v: Vec3, quat: Quat, age_s: float, source: float
+) -> VehicleEstimate:
+    """The vehicle where a reading places it; its past is forgotten."""
+    reset_past_states(history, X_QUAD, 3, (x[0], x[1], x[2], 0.0))
+    reset_past_states(history, V_QUAD, 3, (v[0], v[1], v[2], 0.0))
+    reset_past_states(history, QUAT, 4, quat)
+    vehicle = with_field(with_field(with_field(old, "x_quad", x), "v_quad", v), "quat_wxyz", quat)
+    return with_field(vehicle_with_status(vehicle, age_s, 0.0), "source", source)
 
 
 @kernel

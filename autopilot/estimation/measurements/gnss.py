@@ -17,6 +17,7 @@ from autopilot.estimation.correction import (
     add_velocity_jacobian,
     inject_error,
     past_state,
+    restarted_vehicle,
     vehicle_with_status,
     with_capacity,
     with_load,
@@ -32,7 +33,7 @@ from autopilot.estimation.covariance import (
     within_gate,
     zero_covariance,
 )
-from autopilot.estimation.history import reset_past_states, turning_velocity
+from autopilot.estimation.history import turning_velocity
 from autopilot.estimation.measurements.magnetic import correct_magnetic, magnetic_north
 from autopilot.estimation.measurements.pose import set_initial_covariance
 from autopilot.estimation.measurements.zero_velocity import slides
@@ -45,22 +46,18 @@ from autopilot.estimation.records import (
     NO_SENSOR,
     PLAIN,
     POSITION,
-    QUAT,
     RECEIVER,
     RTK_FIXED,
     RTK_FLOAT,
     SIZE,
     TRACKER,
-    V_QUAD,
     VELOCITY,
-    X_QUAD,
     EstimatorState,
     EstimatorTuning,
     GnssReading,
     History,
     LoadEstimate,
     SensorErrors,
-    VehicleEstimate,
 )
 from autopilot.estimation.tautness import tauten
 from autopilot.geometry.kernel import kernel
@@ -251,22 +248,7 @@ def start_from_fix(
     if not airborne:
         x_quad = (x_quad[0], x_quad[1], old.x_quad[2] if old.source == RECEIVER else tuning.standing_height)
         v_quad = (v_quad[0], v_quad[1], 0.0) if old.source == RECEIVER else ZERO
-    vehicle = VehicleEstimate(
-        x_quad=x_quad,
-        v_quad=v_quad,
-        quat_wxyz=quat,
-        omega_body=old.omega_body,
-        gyro_bias=old.gyro_bias,
-        accel_bias=old.accel_bias,
-        accel_quad=old.accel_quad,
-        age_s=fix.age_s,
-        rejected=0.0,
-        source=RECEIVER,
-        turning_accel=old.turning_accel,
-    )
-    reset_past_states(history, X_QUAD, 3, (x_quad[0], x_quad[1], x_quad[2], 0.0))
-    reset_past_states(history, V_QUAD, 3, (v_quad[0], v_quad[1], v_quad[2], 0.0))
-    reset_past_states(history, QUAT, 4, quat)
+    vehicle = restarted_vehicle(old, history, x_quad, v_quad, quat, fix.age_s, RECEIVER)
     state = with_vehicle(state, vehicle, state.resets + 1.0)
     state = correct_magnetic(state, history, state.sensor_errors.field, 0.0, tuning)
     if state.load.source != TRACKER:

@@ -9,6 +9,7 @@ from autopilot.estimation.correction import (
     corrected_load,
     inject_error,
     past_state,
+    restarted_vehicle,
     vehicle_with_status,
     with_capacity,
     with_load,
@@ -22,7 +23,6 @@ from autopilot.estimation.covariance import (
     within_gate,
     zero_covariance,
 )
-from autopilot.estimation.history import reset_past_states
 from autopilot.estimation.records import (
     ACCEL_BIAS,
     AIR,
@@ -35,18 +35,14 @@ from autopilot.estimation.records import (
     POSE,
     POSITION,
     PUSH,
-    QUAT,
     TRACKED_SIZE,
     TRACKER,
-    V_QUAD,
     VELOCITY,
-    X_QUAD,
     Array,
     EstimatorState,
     EstimatorTuning,
     History,
     PoseReading,
-    VehicleEstimate,
 )
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import IDENTITY as AXES
@@ -108,23 +104,8 @@ def start_from_pose(
     for i in range(3):
         P[POSITION + i, VELOCITY + i] = age * velocity_var
         P[VELOCITY + i, POSITION + i] = age * velocity_var
-    vehicle = VehicleEstimate(
-        x_quad=pose.x_quad,
-        v_quad=pose.v_quad if measured else ZERO,
-        quat_wxyz=pose.quat_wxyz,
-        omega_body=old.omega_body,
-        gyro_bias=old.gyro_bias,
-        accel_bias=old.accel_bias,
-        accel_quad=old.accel_quad,
-        age_s=age,
-        rejected=0.0,
-        source=TRACKER,
-        turning_accel=old.turning_accel,
-    )
-    v = vehicle.v_quad
-    reset_past_states(history, X_QUAD, 3, (pose.x_quad[0], pose.x_quad[1], pose.x_quad[2], 0.0))
-    reset_past_states(history, V_QUAD, 3, (v[0], v[1], v[2], 0.0))
-    reset_past_states(history, QUAT, 4, pose.quat_wxyz)
+    velocity = pose.v_quad if measured else ZERO
+    vehicle = restarted_vehicle(old, history, pose.x_quad, velocity, pose.quat_wxyz, age, TRACKER)
     start_correction(history)
     load = corrected_load(state.load, vehicle, history, 0.0)
     return with_load(with_vehicle(state, vehicle, state.resets + 1.0), load, state.resets + 1.0)
